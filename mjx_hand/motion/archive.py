@@ -1,0 +1,77 @@
+"""Reading and writing the documented `.npz` form of the data that crosses walls.
+
+Every file holds named arrays, a `schema` string ("name/version") and nothing that needs pickle. Files are written
+under a temporary name and renamed, so that a reader never sees half of one.
+"""
+
+import contextlib
+import os
+import tempfile
+import zipfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from mjx_hand.errors import InputError
+
+
+@contextlib.contextmanager
+def replacing(path: str | Path) -> Iterator[Path]:
+    """Yield a temporary path beside `path`; on success it takes `path`'s place, on failure it goes."""
+    path = Path(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {error.strerror}; choose a folder that you may write to") from None
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        umask = os.umask(0)
+        os.umask(umask)
+        temporary.chmod(0o666 & ~umask)  # mkstemp makes private files; give it the mode that open() would
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def save_arrays(path: str | Path, schema: str, arrays: Mapping[str, np.ndarray | float | str]) -> None:
+    """Write named arrays as a compressed `.npz` with its schema."""
+    with replacing(path) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(file, schema=np.array(schema), **{k: np.asarray(v) for k, v in arrays.items()})
+
+
+def open_arrays(path: str | Path) -> dict[str, np.ndarray]:
+    """All arrays of an `.npz` file, without pickle.
+
+    Raises:
+        InputError: the file is missing, is not an `.npz`, is damaged or would need pickle.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; give the path of an .npz file")
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            if not isinstance(file, np.lib.npyio.NpzFile):
+                raise InputError(f"{path}: a single array, not an .npz archive of named arrays")
+            return {name: file[name] for name in file.files}
+    except InputError:
+        raise
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile, KeyError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError(f"{path}: not a readable .npz file ({reason})") from None
+
+
+def load_arrays(path: str | Path, schema: str) -> dict[str, np.ndarray]:
+    """Arrays of a file that `save_arrays` wrote with this schema.
+
+    Raises:
+        InputError: not such a file, or of another schema or version.
+    """
+    arrays = open_arrays(path)
+    found = str(arrays.pop("schema", "none"))
+    if found != schema:
+        raise InputError(f"{path}: schema {found}, expected {schema}; make it again with this version of mjx-hand")
+    return arrays
