@@ -1,0 +1,67 @@
+# `make` alone lists the targets. Needs Python 3.11 or newer with venv; everything else goes into .venv.
+
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+PIP_FLAGS := --quiet --disable-pip-version-check
+# Two workers suit the usual test run, which spends its time in JAX compilations.
+WORKERS ?= 2
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test test-slow lint format types bench lock clean
+
+help:  ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+setup: $(STAMP)  ## make .venv with the locked packages (again only when they change)
+
+# Candidates are run, not just looked up: a name on the PATH may be a launcher for a Python that is not there.
+$(STAMP): requirements.lock pyproject.toml
+	@set -e; \
+	if [ ! -x $(BIN)/python ]; then \
+	  found=; \
+	  for candidate in $(PYTHON) python3.11 python3.12 python3.13 python3; do \
+	    if $$candidate -c 'import sys, venv; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1; then found=$$candidate; break; fi; \
+	  done; \
+	  if [ -z "$$found" ]; then \
+	    echo "make: found no Python 3.11 or newer with venv (tried $(PYTHON) python3.11 python3.12 python3.13 python3);" \
+	      "install one, or name it: make setup PYTHON=/path/to/python3" >&2; exit 1; \
+	  fi; \
+	  echo "making $(VENV) with $$found ($$($$found -V))"; \
+	  $$found -m venv $(VENV); \
+	fi; \
+	echo "installing the packages of requirements.lock (a minute or two)"; \
+	$(BIN)/python -m pip install $(PIP_FLAGS) --require-hashes -r requirements.lock; \
+	$(BIN)/python -m pip install $(PIP_FLAGS) --no-deps --no-build-isolation --no-index -e .; \
+	touch $@
+
+demo: $(STAMP)  ## retarget a recording, train a pinch policy, write a report with plots and a video
+	$(BIN)/python -m train.demo
+
+test: $(STAMP)  ## run the tests
+	$(BIN)/python -m pytest -n $(WORKERS)
+
+test-slow: $(STAMP)  ## run the tests that take more than a minute each
+	$(BIN)/python -m pytest -m slow
+
+lint: $(STAMP)  ## check style and formatting
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+format: $(STAMP)  ## mend what lint can mend
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+types: $(STAMP)  ## check the types
+	$(BIN)/pyright
+
+bench: $(STAMP)  ## measure this machine: steps per second of each physics engine
+	$(BIN)/python -m train.benchmark
+
+lock: $(STAMP)  ## resolve requirements.lock again from pyproject.toml
+	UV_CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/uv pip compile --quiet --upgrade --universal --generate-hashes --no-annotate \
+	  --no-emit-index-url --no-emit-find-links --extra dev --python-version 3.11 pyproject.toml -o requirements.lock
+
+clean:  ## remove build products and caches of this folder (not .venv, not results)
+	rm -rf build dist .pytest_cache .ruff_cache .hypothesis .jax_cache *.egg-info
+	find . -path ./$(VENV) -prune -o -name __pycache__ -type d -print0 | xargs -0 rm -rf
