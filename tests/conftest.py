@@ -1,0 +1,28 @@
+"""What all tests share: shape checks at run time, kept compilations, off-screen rendering, real recordings."""
+
+import os
+from pathlib import Path
+
+import pytest
+from jaxtyping import install_import_hook
+
+# Before MuJoCo's first import, which reads it.
+os.environ.setdefault("MUJOCO_GL", "egl")
+
+# Before any of these packages is imported: every signature's shapes and types are then checked as the tests run.
+install_import_hook(["mjx_hand", "envs", "train"], "beartype.beartype")
+
+from mjx_hand.compile_cache import enable_compile_cache  # noqa: E402
+
+enable_compile_cache()
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session")
+def recordings() -> Path:
+    """The folder of real recordings, which are not part of the project."""
+    folder = ROOT.parent / "shared" / "data"
+    if not folder.is_dir():
+        pytest.skip(f"no real recordings: {folder} does not exist")
+    return folder

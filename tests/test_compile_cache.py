@@ -1,0 +1,56 @@
+"""The compilation cache: where it is, and that another process finds what one compiled."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mjx_hand.compile_cache import cache_folder, enable_compile_cache
+from mjx_hand.errors import InputError
+
+COMPILE = """
+from mjx_hand.compile_cache import enable_compile_cache
+enable_compile_cache()
+import jax, jax.numpy as jnp
+hits = []
+jax.monitoring.register_event_listener(lambda event, **_: hits.append(event.endswith("cache_hits")))
+def many(x):
+    for _ in range(12):
+        x = jnp.sin(x @ x) + jnp.linalg.svd(x)[0]
+    return x
+jax.jit(many)(jnp.eye(3)).block_until_ready()
+print("hit" if any(hits) else "miss")
+"""
+
+
+def test_folder_follows_the_variable_then_xdg_then_home(monkeypatch, tmp_path):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.delenv("MJX_HAND_CACHE", raising=False)
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    assert cache_folder() == tmp_path / ".cache/mjx-hand/jax"
+    monkeypatch.setenv("XDG_CACHE_HOME", "relative")
+    assert cache_folder() == tmp_path / ".cache/mjx-hand/jax"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
+    assert cache_folder() == tmp_path / "xdg/mjx-hand/jax"
+    monkeypatch.setenv("MJX_HAND_CACHE", "~/here")
+    assert cache_folder() == tmp_path / "here"
+
+
+def test_folder_that_cannot_be_made_is_an_input_error(monkeypatch, tmp_path):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("MJX_HAND_CACHE", str(tmp_path / "file" / "below"))
+    with pytest.raises(InputError, match="set MJX_HAND_CACHE"):
+        enable_compile_cache()
+
+
+def test_second_process_reuses_what_the_first_compiled_and_says_nothing(tmp_path: Path):
+    environment = {k: v for k, v in os.environ.items() if k != "TF_CPP_MIN_LOG_LEVEL"}
+    environment["MJX_HAND_CACHE"] = str(tmp_path)
+    runs = [
+        subprocess.run([sys.executable, "-c", COMPILE], env=environment, capture_output=True, text=True, check=True)
+        for _ in range(2)
+    ]
+    assert [run.stdout.strip() for run in runs] == ["miss", "hit"]
+    assert runs[1].stderr == ""
