@@ -1,0 +1,91 @@
+"""`build_rigid_hand`: a skinned hand of a given shape, made rigid."""
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+
+from mjx_hand.errors import InputError
+from mjx_hand.hand.joints import PARENTS, TIP_LINKS
+from mjx_hand.hand.model import HandModel
+from mjx_hand.hand.skinning import joint_centres, shaped_template
+from mjx_hand.rigid.axes import AXES
+from mjx_hand.rigid.collision import palm_capsules, phalanx_capsules, skin_samples
+from mjx_hand.rigid.limits import anatomical_limits
+from mjx_hand.rigid.rigid_hand import RigidHand
+from mjx_hand.rigid.segments import close, cut, mass_properties
+
+
+def build_rigid_hand(hand: HandModel, shape: ArrayLike | None = None, axes: str = "anatomical") -> RigidHand:
+    """Cut a hand into 16 rigid links joined by 20 hinges (arXiv 2512.07359, section III).
+
+    Args:
+        hand: the skinned hand; its rest pose becomes the rigid hand's zero.
+        shape: shape coefficients, unit variance each, at most `hand.num_shape`; None is the mean shape.
+        axes: how the hinge axes are found, a name in `axes.AXES`.
+
+    Raises:
+        InputError: an unknown axis rule, or coefficients that are not valid or turn a segment inside out.
+    """
+    if axes not in AXES:
+        raise InputError(f"axes is {axes!r}; valid: {', '.join(AXES)}")
+    coefficients = _checked_shape(hand, shape)
+    shaped = shaped_template(hand, jnp.asarray(coefficients))
+    rest = np.asarray(shaped, dtype=float)
+    centres = np.asarray(joint_centres(hand, shaped), dtype=float)
+    tips = rest[np.asarray(hand.tip_vertices)]
+
+    pieces = cut(hand)
+    meshes = [piece.vertices(rest) for piece in pieces]
+    properties = [mass_properties(mesh, piece.faces) for mesh, piece in zip(meshes, pieces, strict=True)]
+    mass = np.array([p[0] for p in properties])
+    whole = close(np.asarray(hand.faces))
+    total = mass_properties(whole.vertices(rest), whole.faces)[0]
+    if mass.min() <= 0 or total <= 0:
+        raise InputError(f"shape {np.round(coefficients, 2).tolist()} turns the hand inside out; stay within +-5")
+    # Caps overlap where three segments meet, at the webs: scale so that the links weigh what the hand does.
+    scale = total / mass.sum()
+
+    samples = [
+        skin_samples(mesh, piece.faces[: piece.num_skin_faces]) for mesh, piece in zip(meshes, pieces, strict=True)
+    ]
+    points, areas = [s[0] for s in samples], [s[1] for s in samples]
+    palm_ends, palm_radii = palm_capsules(points[0], areas[0], centres)
+    finger_ends, finger_radii = phalanx_capsules(points, areas, centres, tips)
+    capsule_links = (0,) * len(palm_radii) + tuple(range(1, 16))
+    lower, upper = anatomical_limits()
+    return RigidHand(
+        wrist_position=centres[0],
+        link_offset=np.concatenate([np.zeros((1, 3)), centres[1:] - centres[list(PARENTS[1:])]]),
+        hinge_axis=AXES[axes](centres, hand.side),
+        hinge_lower=lower,
+        hinge_upper=upper,
+        tip_offset=tips - centres[list(TIP_LINKS)],
+        link_mass=mass * scale,
+        link_com=np.stack([p[1] for p in properties]) - centres,
+        link_inertia=np.stack([p[2] for p in properties]) * scale,
+        capsule_ends=np.concatenate([palm_ends, finger_ends]) - centres[list(capsule_links)][:, None],
+        capsule_radius=np.concatenate([palm_radii, finger_radii]),
+        mesh_vertices=tuple(mesh - centre for mesh, centre in zip(meshes, centres, strict=True)),
+        mesh_faces=tuple(piece.faces for piece in pieces),
+        capsule_links=capsule_links,
+        side=hand.side,
+        name=hand.name,
+    )
+
+
+def _checked_shape(hand: HandModel, shape: ArrayLike | None) -> Float[np.ndarray, "s"]:
+    """The coefficients, zero-padded to the hand's own number so that every call compiles to the same shapes."""
+    full = np.zeros(hand.num_shape)
+    if shape is None:
+        return full
+    try:
+        given = np.asarray(shape, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"shape is {shape!r}; give up to {hand.num_shape} numbers") from None
+    if given.ndim != 1 or len(given) > hand.num_shape:
+        raise InputError(f"shape has dimensions {given.shape}; give a list of up to {hand.num_shape} coefficients")
+    if not np.isfinite(given).all():
+        raise InputError(f"shape is {given.tolist()}; every coefficient must be finite")
+    full[: len(given)] = given
+    return full
