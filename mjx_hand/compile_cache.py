@@ -39,7 +39,7 @@ def enable_compile_cache() -> Path:
         ) from None
     # XLA logs, as an error, that two tuning flags of a cached CPU function are no real features of this CPU. The
     # features themselves are part of the cache's key, so a function made for another CPU is never loaded.
-    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
+    jax.config.update("jax_logging_level", "CRITICAL")
     jax.config.update("jax_compilation_cache_dir", str(folder))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.2)  # JAX's own second would skip most of ours
     return folder
