@@ -1,11 +1,14 @@
 """`RigidHand`: 16 rigid links, 20 hinges, and their forward kinematics."""
 
+from collections.abc import Sequence
+
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from mjx_hand.hand.joints import HINGE_LINKS, NUM_HINGES, PARENTS, TIP_LINKS
-from mjx_hand.pytree import pytree, static
+from mjx_hand.pytree import pytree, replace, static
 from mjx_hand.rotations import axis_angle_matrix
 
 
@@ -92,3 +95,10 @@ def finger_tips(angles: Float[Array, "*b 20"], rigid: RigidHand) -> Float[Array,
     rot, pos = forward_kinematics(angles, rigid)
     tips = list(TIP_LINKS)
     return pos[..., tips, :] + jnp.einsum("...fij,fj->...fi", rot[..., tips, :, :], jnp.asarray(rigid.tip_offset))
+
+
+def stack_hands(hands: Sequence[RigidHand]) -> RigidHand:
+    """Hands of one structure as one `RigidHand` with a leading axis, to `vmap` over; float32, without their meshes."""
+    first = hands[0]
+    bare = [replace(h, mesh_vertices=(), mesh_faces=(), name=first.name) for h in hands]
+    return jax.tree.map(lambda *rows: jnp.asarray(np.stack(rows), jnp.float32), *bare)

@@ -1,0 +1,91 @@
+"""Performing scripted grasps in the physics engine, and keeping those that a person could have done."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from jaxtyping import Bool, Float
+from mujoco import batch
+from scipy.spatial.transform import Rotation
+
+from envs.scene import NUM_WRIST, TIMESTEP
+from mjx_hand.hand.joints import NUM_HINGES
+
+_RISE = 0.06  # m the object must rise
+_SLIP, _SLIP_TURN = 0.01, np.deg2rad(15.0)  # how far it may move in the hand after the lift
+
+
+@dataclasses.dataclass(frozen=True)
+class Performance:
+    """What the engine made of a batch of scripts; n performances of t physics steps, metres, radians, wxyz.
+
+    Attributes:
+        angles: achieved hinge angles.
+        wrist_position, wrist_rotation: achieved wrist pose (world_from_hand as a matrix).
+        object_pose: position and quaternion.
+        held: lifted, and not slipped in the hand from the lift's end to the last frame.
+    """
+
+    angles: Float[np.ndarray, "n t 20"]
+    wrist_position: Float[np.ndarray, "n t 3"]
+    wrist_rotation: Float[np.ndarray, "n t 3 3"]
+    object_pose: Float[np.ndarray, "n t 7"]
+    held: Bool[np.ndarray, "n"]
+
+
+def perform(
+    models: Sequence[mujoco.MjModel],
+    bases: Float[np.ndarray, "n 3 3"],
+    controls: Float[np.ndarray, "n t 26"],
+    object_start: Float[np.ndarray, "n 7"],
+    lifted_at: Float[np.ndarray, "n"],
+) -> Performance:
+    """Run each model under its controls, one row a physics step, from its first control's pose.
+
+    Args:
+        models: scenes (`envs.scene.scene_model`) on the engine's settings.
+        bases: world_from_base of each scene's wrist.
+        controls: targets of the wrist's six joints and the hinges.
+        object_start: where each object stands.
+        lifted_at: time (s) at which each lift ends.
+    """
+    count, steps = controls.shape[:2]
+    worlds = batch.Batch(models[0], nsim=count)
+    worlds.set_models(models)
+    worlds.bind("qpos")[:] = np.concatenate([controls[:, 0], object_start], axis=1)
+    qpos = worlds.rollout(steps, control=controls, record=("qpos",))["qpos"]
+
+    turns = Rotation.from_euler("XYZ", qpos[..., 3:NUM_WRIST].reshape(-1, 3)).as_matrix().reshape(count, steps, 3, 3)
+    rotation = bases[:, None] @ turns
+    position = np.einsum("nij,ntj->nti", bases, qpos[..., :3])
+    pose = qpos[..., NUM_WRIST + NUM_HINGES :]
+    diverged = worlds.warning[:, :, 1].any(axis=1)
+    return Performance(
+        angles=qpos[..., NUM_WRIST : NUM_WRIST + NUM_HINGES],
+        wrist_position=position,
+        wrist_rotation=rotation,
+        object_pose=pose,
+        held=_held(rotation, position, pose, lifted_at) & ~diverged,
+    )
+
+
+def _held(
+    rotation: Float[np.ndarray, "n t 3 3"],
+    position: Float[np.ndarray, "n t 3"],
+    pose: Float[np.ndarray, "n t 7"],
+    lifted_at: Float[np.ndarray, "n"],
+) -> Bool[np.ndarray, "n"]:
+    """Whether each object rose, and stayed where it was in the hand after the lift."""
+    rows = np.arange(len(pose))
+    lifted = np.round(lifted_at / TIMESTEP).astype(int)
+    rose = pose[:, -1, 2] - pose[:, 0, 2] > _RISE
+    in_hand = np.einsum("ntji,ntj->nti", rotation, pose[..., :3] - position)
+    slip = np.linalg.norm(in_hand[:, -1] - in_hand[rows, lifted], axis=-1)
+
+    def orientation(index: np.ndarray) -> Rotation:
+        quaternion = Rotation.from_quat(pose[rows, index, 3:], scalar_first=True)
+        return Rotation.from_matrix(rotation[rows, index]).inv() * quaternion
+
+    turn = (orientation(lifted).inv() * orientation(np.full(len(pose), pose.shape[1] - 1))).magnitude()
+    return rose & (slip < _SLIP) & (turn < _SLIP_TURN)

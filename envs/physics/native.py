@@ -1,0 +1,136 @@
+"""The `native` engine: MuJoCo's C engine on all cores, through `mujoco.batch.Batch`.
+
+The simulation state crosses into JAX bit-cast from float64 to pairs of uint32, so that stepping is a pure and exact
+function of what JAX holds: it survives scans, `where` and checkpoints without rounding. Only NumPy runs in the callback.
+"""
+
+import copy
+import os
+import threading
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from jaxtyping import Array, Float, Int
+from mujoco import batch
+
+from envs.physics.engine import PhysicsState
+
+# Fields of the integration state that one step hands to the next; the control comes with each step.
+CARRIED = ("time", "qpos", "qvel", "act", "qacc_warmstart")
+# Warnings that mean the engine found a bad number and reset the simulation by itself.
+DIVERGED = [
+    int(w)
+    for w in (
+        mujoco.mjtWarning.mjWARN_BADQPOS,
+        mujoco.mjtWarning.mjWARN_BADQVEL,
+        mujoco.mjtWarning.mjWARN_BADQACC,
+        mujoco.mjtWarning.mjWARN_BADCTRL,
+    )
+]
+
+
+def make(models: Sequence[mujoco.MjModel], substeps: int) -> "NativeEngine":
+    """The engine with the settings that held best in the solver sweep (Newton stops early, so the caps are cheap)."""
+    tuned = [copy.copy(model) for model in models]
+    for model in tuned:
+        model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
+        model.opt.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+        model.opt.impratio = 10.0
+        model.opt.iterations = 10
+        model.opt.ls_iterations = 20
+    return NativeEngine(tuned, substeps)
+
+
+class NativeEngine:
+    """See `envs.physics.engine.Engine`."""
+
+    name = "native"
+
+    def __init__(self, models: Sequence[mujoco.MjModel], substeps: int, threads: int | None = None):
+        self.models = list(models)
+        self.substeps = substeps
+        self._threads = threads or len(os.sched_getaffinity(0))
+        self._batches: dict[int, batch.Batch] = {}
+        self._running: dict[int, np.ndarray] = {}  # the variants that each cached batch is set to
+        self._lock = threading.Lock()
+        model = self.models[0]
+        sizes = {"time": 1, "qpos": model.nq, "qvel": model.nv, "act": model.na, "qacc_warmstart": model.nv}
+        ends = np.cumsum([sizes[field] for field in CARRIED])
+        self._slices = {f: slice(e - sizes[f], e) for f, e in zip(CARRIED, ends, strict=True)}
+        self._size = int(ends[-1])
+
+    def reset(
+        self, variant: Int[Array, ""], qpos: Float[Array, "nq"], qvel: Float[Array, "nv"], ctrl: Float[Array, "nu"]
+    ) -> PhysicsState:
+        return self._state(variant, self._call(self._host_reset, variant, qpos, qvel))
+
+    def step(self, state: PhysicsState, ctrl: Float[Array, "nu"]) -> PhysicsState:
+        return self._state(state.variant, self._call(self._host_step, state.variant, state.memory, ctrl))
+
+    def _call(self, host: Any, *args: Array) -> tuple[Array, ...]:
+        model = self.models[0]
+        shapes = (
+            jax.ShapeDtypeStruct((2 * self._size,), jnp.uint32),
+            jax.ShapeDtypeStruct((model.nq,), jnp.float32),
+            jax.ShapeDtypeStruct((model.nv,), jnp.float32),
+            jax.ShapeDtypeStruct((model.nsensordata,), jnp.float32),
+            jax.ShapeDtypeStruct((), jnp.float32),
+        )
+        return jax.pure_callback(host, shapes, *args, vmap_method="broadcast_all")
+
+    def _state(self, variant: Int[Array, ""], out: tuple[Array, ...]) -> PhysicsState:
+        memory, qpos, qvel, sensordata, unstable = out
+        return PhysicsState(
+            variant=variant, qpos=qpos, qvel=qvel, sensordata=sensordata, memory=memory, unstable=unstable
+        )
+
+    def _host_reset(self, variant: Any, qpos: Any, qvel: Any) -> tuple[np.ndarray, ...]:
+        variant, qpos, qvel = np.asarray(variant), np.asarray(qpos), np.asarray(qvel)
+        lead = variant.shape
+        carried = np.zeros((variant.size, self._size))
+        carried[:, self._slices["qpos"]] = qpos.reshape(variant.size, -1)
+        carried[:, self._slices["qvel"]] = qvel.reshape(variant.size, -1)
+        with self._lock:
+            worlds = self._load(variant.reshape(-1), carried)
+            worlds.forward(stage=mujoco.mjtStage.mjSTAGE_POS)
+            return self._unload(worlds, lead)
+
+    def _host_step(self, variant: Any, memory: Any, ctrl: Any) -> tuple[np.ndarray, ...]:
+        variant, memory, ctrl = np.asarray(variant), np.asarray(memory), np.asarray(ctrl)
+        lead = variant.shape
+        carried = np.ascontiguousarray(memory.reshape(variant.size, -1)).view(np.float64)
+        with self._lock:
+            worlds = self._load(variant.reshape(-1), carried)
+            worlds.bind("ctrl")[:] = ctrl.reshape(variant.size, -1)
+            # POS: without it positions derived from the state, sensors among them, lag one substep behind it.
+            worlds.step(nstep=self.substeps, stage=mujoco.mjtStage.mjSTAGE_POS)
+            return self._unload(worlds, lead)
+
+    def _load(self, variant: np.ndarray, carried: np.ndarray) -> batch.Batch:
+        """A batch of this size whose worlds run the given variants from the given states."""
+        count = variant.size
+        if count not in self._batches:
+            made = batch.Batch(self.models[0], nsim=count, nthread=min(self._threads, count))
+            made.bind("sensordata")
+            self._batches[count] = made
+            self._running[count] = np.full(count, -1)
+        worlds = self._batches[count]
+        if not np.array_equal(self._running[count], variant):
+            worlds.set_models([self.models[v] for v in variant])
+            self._running[count] = variant.copy()
+        for field in CARRIED:
+            target = worlds.bind(field)
+            target[...] = carried[:, self._slices[field]].reshape(target.shape)
+        worlds.warning[...] = 0
+        return worlds
+
+    def _unload(self, worlds: batch.Batch, lead: tuple[int, ...]) -> tuple[np.ndarray, ...]:
+        carried = np.concatenate([worlds.bind(f).reshape(worlds.nsim, -1) for f in CARRIED], axis=1)
+        fields = [worlds.bind(f).astype(np.float32) for f in ("qpos", "qvel", "sensordata")]
+        unstable = (worlds.warning[:, DIVERGED, 1] > 0).any(axis=1).astype(np.float32)
+        bits = np.ascontiguousarray(carried).view(np.uint32)
+        return (bits.reshape(*lead, -1), *(f.reshape(*lead, -1) for f in fields), unstable.reshape(lead))

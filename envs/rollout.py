@@ -1,0 +1,38 @@
+"""`Rollouts`: what a twin did, beside what the demonstrations asked; the input of every metric, plot and video."""
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from mjx_hand.pytree import pytree, static
+
+
+@pytree
+class Rollouts:
+    """n rollouts of t control steps, padded to one length; metres, radians, seconds, quaternions wxyz, world frame.
+
+    Frame 0 is the start; `counted` marks the demonstration's own frames, `held` those after its end, in which the last
+    target is held on (all False where the rollouts were not continued).
+
+    Attributes:
+        demonstration: which demonstration each rollout followed.
+        qpos: the scene's coordinates (wrist 6, hinges 20, object's free joint 7).
+        object_pose, object_reference: achieved and demonstrated.
+        joints, joints_reference: the 16 joint centres.
+        tips, tips_reference: the 5 finger tips.
+        counted, held: frame masks.
+        reward: of the step that led to each frame.
+        fps: control rate.
+    """
+
+    demonstration: Int[np.ndarray, "n"]
+    qpos: Float[np.ndarray, "n t nq"]
+    object_pose: Float[np.ndarray, "n t 7"]
+    object_reference: Float[np.ndarray, "n t 7"]
+    joints: Float[np.ndarray, "n t 16 3"]
+    joints_reference: Float[np.ndarray, "n t 16 3"]
+    tips: Float[np.ndarray, "n t 5 3"]
+    tips_reference: Float[np.ndarray, "n t 5 3"]
+    counted: Bool[np.ndarray, "n t"]
+    held: Bool[np.ndarray, "n t"]
+    reward: Float[np.ndarray, "n t"]
+    fps: float = static()

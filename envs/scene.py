@@ -1,0 +1,105 @@
+"""The twin's scene: the rigid hand on an actuated wrist, an object, the block it stands on, and a table."""
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation
+
+from mjx_hand.errors import InputError
+from mjx_hand.motion.demonstration import Demonstration, ObjectDescription
+from mjx_hand.rigid.gains import Gains
+from mjx_hand.rigid.mjcf import hand_spec
+from mjx_hand.rigid.rigid_hand import RigidHand
+
+TIMESTEP = 0.004  # s; 10 ms loses every grasp, 6.7 ms a third of them
+OBJECT, SUPPORT, TABLE = "object", "support", "table"
+NUM_WRIST = 6  # actuated wrist joints, before the hinges in qpos and ctrl
+
+# Who meets whom: (contype, conaffinity). The hand meets the object alone; the object also block and table.
+_HAND_MEETS, _OBJECT_MEETS, _GROUND_MEETS = (1, 0), (2, 1), (0, 2)
+_GEOM = {
+    "box": mujoco.mjtGeom.mjGEOM_BOX,
+    "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
+    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
+}
+
+
+def scene_model(
+    rigid: RigidHand,
+    thing: ObjectDescription,
+    support: Float[np.ndarray, "3"],
+    support_position: Float[np.ndarray, "3"],
+    base_rotation: Float[np.ndarray, "3 3"],
+    *,
+    gains: Gains | None = None,
+    visual: bool = False,
+) -> mujoco.MjModel:
+    """Compile the scene. qpos is the wrist's 3 slides (m) and 3 turns (rad), the 20 hinges, the object's free joint.
+
+    Args:
+        rigid: the hand.
+        thing: the object.
+        support, support_position: half extents and centre (m, world) of the block that the object stands on.
+        base_rotation: world_from_base; the wrist's slides run along the base's axes and its turns start from it, so
+            that they stay far from the Euler angles' singularity for a demonstration that starts near it.
+        gains: of the hand's joints.
+        visual: with the hand's meshes, for pictures; without them the model is small and quick.
+    """
+    if thing.kind not in _GEOM:
+        raise InputError(f"object kind {thing.kind!r} is not known; valid: {', '.join(_GEOM)}")
+    spec = hand_spec(rigid, base="actuated", visual=visual, gains=gains)
+    spec.option.timestep = TIMESTEP
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+    wrist = spec.body("wrist")
+    wrist.quat = Rotation.from_matrix(base_rotation).as_quat(scalar_first=True)
+    for body in spec.bodies[1:]:
+        body.gravcomp = 1.0  # the arm that is not modelled carries the hand
+    for geom in spec.geoms:
+        if geom.contype:
+            geom.contype, geom.conaffinity = _HAND_MEETS
+            _contact(geom, thing.friction)
+    _add_ground(spec, support, support_position, thing.friction)
+    body = spec.worldbody.add_body(name=OBJECT)
+    body.add_freejoint(name=OBJECT)
+    geom = body.add_geom(
+        name=OBJECT, type=_GEOM[thing.kind], size=thing.size, mass=thing.mass, rgba=(0.9, 0.35, 0.2, 1.0)
+    )
+    geom.contype, geom.conaffinity = _OBJECT_MEETS
+    _contact(geom, thing.friction)
+    return spec.compile()
+
+
+def _contact(geom: mujoco.MjsGeom, friction: float) -> None:
+    geom.condim = 4  # torsion too: a pad is an area, not a point
+    geom.friction = [friction, 0.005, 0.0001]
+    geom.solref = [0.01, 1.0]  # 0.02 costs a pinch twenty points of success
+
+
+def _add_ground(
+    spec: mujoco.MjSpec, support: Float[np.ndarray, "3"], position: Float[np.ndarray, "3"], friction: float
+) -> None:
+    table = spec.worldbody.add_geom(
+        name=TABLE, type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1.0, 1.0, 0.01], rgba=(0.82, 0.82, 0.8, 1.0)
+    )
+    block = spec.worldbody.add_geom(
+        name=SUPPORT, type=mujoco.mjtGeom.mjGEOM_BOX, size=support, pos=position, rgba=(0.5, 0.55, 0.6, 1.0)
+    )
+    for geom in (table, block):
+        geom.contype, geom.conaffinity = _GROUND_MEETS
+        _contact(geom, friction)
+
+
+def base_rotation(demonstration: Demonstration) -> Float[np.ndarray, "3 3"]:
+    """world_from_base of a demonstration's scene: where the wrist's orientation starts."""
+    first = int(np.argmax(demonstration.motion.valid))
+    return Rotation.from_quat(demonstration.motion.wrist_quaternion[first], scalar_first=True).as_matrix()
+
+
+def wrist_coordinates(
+    position: Float[np.ndarray, "t 3"], quaternion: Float[np.ndarray, "t 4"], base: Float[np.ndarray, "3 3"]
+) -> Float[np.ndarray, "t 6"]:
+    """The wrist's slides (m) and turns (rad, R = Rx Ry Rz, without jumps of 2 pi) for world poses (wxyz)."""
+    turned = Rotation.from_matrix(base.T) * Rotation.from_quat(quaternion, scalar_first=True)
+    turns = np.unwrap(turned.as_euler("XYZ"), axis=0)
+    return np.concatenate([position @ base, turns], axis=1)

@@ -1,0 +1,34 @@
+"""Signed distances from points to objects of simple shape, differentiable, for grasp postures and grip offsets."""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from mjx_hand.errors import InputError
+
+
+def signed_distance(kind: str, size: Float[Array, "*b 3"], point: Float[Array, "*b 3"]) -> Float[Array, "*b"]:
+    """Distance (m) from a point in the object's frame to its surface, negative inside.
+
+    Args:
+        kind: "box", "sphere" or "cylinder" (sizes as in `motion.ObjectDescription`).
+        size: the object's size (m), broadcast against the points.
+        point: in the object's frame (m).
+    """
+    if kind == "box":
+        return _rounded(jnp.abs(point) - size)
+    if kind == "sphere":
+        return _norm(point) - size[..., 0]
+    if kind == "cylinder":
+        radial = _norm(point[..., :2]) - size[..., 0]
+        axial = jnp.abs(point[..., 2]) - size[..., 1]
+        return _rounded(jnp.stack([radial, axial], axis=-1))
+    raise InputError(f"object kind {kind!r} is not known; valid: box, sphere, cylinder")
+
+
+def _norm(v: Float[Array, "*b n"]) -> Float[Array, "*b"]:
+    return jnp.sqrt(jnp.sum(v * v, axis=-1) + 1e-14)  # the constant keeps the gradient at the centre finite
+
+
+def _rounded(outside: Float[Array, "*b n"]) -> Float[Array, "*b"]:
+    """Distance to a product of intervals from the signed excess along each of its axes."""
+    return _norm(jnp.maximum(outside, 0.0)) + jnp.minimum(jnp.max(outside, axis=-1), 0.0)

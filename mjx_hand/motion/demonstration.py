@@ -1,0 +1,129 @@
+"""`Demonstration`: a hand and an object in motion, ready for a physics twin to replay."""
+
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from mjx_hand.errors import InputError
+from mjx_hand.hand.joints import HINGES
+from mjx_hand.motion.archive import load_arrays, save_arrays
+from mjx_hand.motion.joint_motion import JointMotion
+from mjx_hand.pytree import pytree, static
+
+SCHEMA = "mjx-hand/demonstration/1"
+OBJECT_KINDS = ("box", "sphere", "cylinder")
+
+
+@pytree
+class ObjectDescription:
+    """A rigid object of simple shape; metres, kilograms.
+
+    Attributes:
+        size: half extents of a box; (radius, 0, 0) of a sphere; (radius, half height, 0) of a cylinder along z.
+        mass: uniform density is assumed.
+        friction: sliding coefficient.
+        kind: one of `OBJECT_KINDS`.
+    """
+
+    size: Float[np.ndarray, "3"]
+    mass: float
+    friction: float
+    kind: str = static()
+
+
+@pytree
+class Demonstration:
+    """A recorded manipulation in a world frame with z up and the table at z = 0; metres, radians, wxyz.
+
+    Attributes:
+        motion: the twin's hinge angles and wrist poses, at the control rate.
+        object_pose: position and quaternion of the object's frame, a row a frame.
+        object: what is manipulated.
+        support: half extents of the block that the object stands on at first.
+        support_position: centre of that block.
+        shape: MANO shape coefficients of the person, from which the twin's hand is built.
+        grasp: name of the grasp type.
+        source: provenance, one line.
+    """
+
+    motion: JointMotion
+    object_pose: Float[np.ndarray, "t 7"]
+    object: ObjectDescription
+    support: Float[np.ndarray, "3"]
+    support_position: Float[np.ndarray, "3"]
+    shape: Float[np.ndarray, "s"]
+    grasp: str = static()
+    source: str = static(default="")
+
+    @property
+    def num_frames(self) -> int:
+        return self.object_pose.shape[0]
+
+
+def save_demonstration(demonstration: Demonstration, path: str | Path) -> None:
+    """Write as `.npz` (schema mjx-hand/demonstration/1)."""
+    d, m = demonstration, demonstration.motion
+    save_arrays(
+        path,
+        SCHEMA,
+        {
+            "fps": m.fps,
+            "angles": m.angles,
+            "wrist_position": m.wrist_position,
+            "wrist_quaternion": m.wrist_quaternion,
+            "valid": m.valid,
+            "side": m.side,
+            "joint_names": np.array(HINGES),
+            "object_pose": d.object_pose,
+            "object_kind": d.object.kind,
+            "object_size": d.object.size,
+            "object_mass": d.object.mass,
+            "object_friction": d.object.friction,
+            "support": d.support,
+            "support_position": d.support_position,
+            "shape": d.shape,
+            "grasp": d.grasp,
+            "source": d.source,
+        },
+    )
+
+
+def load_demonstration(path: str | Path) -> Demonstration:
+    """Read what `save_demonstration` wrote.
+
+    Raises:
+        InputError: not such a file, of another joint order, or with frames that do not match.
+    """
+    a = load_arrays(path, SCHEMA)
+    if tuple(a.get("joint_names", ())) != HINGES:
+        raise InputError(f"{path}: its joint names are not this version's; make the demonstration again")
+    source = str(a["source"])
+    motion = JointMotion(
+        fps=float(a["fps"]),
+        angles=a["angles"],
+        wrist_position=a["wrist_position"],
+        wrist_quaternion=a["wrist_quaternion"],
+        valid=a["valid"].astype(bool),
+        side=str(a["side"]),
+        source=source,
+    )
+    if a["object_pose"].shape != (motion.num_frames, 7):
+        raise InputError(
+            f"{path}: object_pose has shape {a['object_pose'].shape}, expected ({motion.num_frames}, 7) as the hand"
+        )
+    return Demonstration(
+        motion=motion,
+        object_pose=a["object_pose"],
+        object=ObjectDescription(
+            kind=str(a["object_kind"]),
+            size=a["object_size"],
+            mass=float(a["object_mass"]),
+            friction=float(a["object_friction"]),
+        ),
+        support=a["support"],
+        support_position=a["support_position"],
+        shape=a["shape"],
+        grasp=str(a["grasp"]),
+        source=source,
+    )
