@@ -1,0 +1,59 @@
+"""Refuses what is not a rotation before it can turn into a wrong angle."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from mjx_hand.errors import InputError
+from mjx_hand.projection.products import compose
+
+TOLERANCE = 1e-3  # of R Rᵀ - I and of det R - 1: looser than float32 rounding, tighter than any real mistake
+
+
+def check_rotations(rotations: Array | np.ndarray, joints: int) -> Float[Array, "*b joints 3 3"]:
+    """The rotations as a floating array; values are looked at only where they are known (not while tracing).
+
+    Raises:
+        InputError: for another shape, or matrices that are not rotations.
+    """
+    wanted = f"rotations have shape (..., {joints}, 3, 3)"
+    if not isinstance(rotations, jax.Array):
+        try:
+            rotations = np.asarray(rotations)
+        except ValueError as error:
+            raise InputError(f"the rotations given are ragged; {wanted}") from error
+        if rotations.dtype.kind not in "fiu":
+            raise InputError(f"the rotations given are of type {rotations.dtype}; real numbers are needed")
+    array = jnp.asarray(rotations)
+    if array.shape[-3:] != (joints, 3, 3):
+        hint = "; convert axis-angle poses with mjx_hand.rotations.exp" if array.shape[-1:] in ((3,), (45,)) else ""
+        raise InputError(f"the rotations given have shape {array.shape}; {wanted}{hint}")
+    if not jnp.issubdtype(array.dtype, jnp.floating):
+        array = array.astype(jnp.float32)
+    if not isinstance(array, jax.core.Tracer) and array.size:
+        _check_values(array)
+    return array
+
+
+def _check_values(rotations: Array) -> None:
+    worst, where = _worst(rotations)
+    if worst <= TOLERANCE:  # false for NaN
+        return
+    index = ", ".join(str(int(i)) for i in np.unravel_index(int(where), rotations.shape[:-2]))
+    if not np.isfinite(worst):
+        raise InputError(f"rotations[{index}] is not finite; drop such frames, or fill them, before projecting")
+    raise InputError(
+        f"rotations[{index}] is off a rotation by {float(worst):.2g} (R Rᵀ = I and det R = 1 must hold to {TOLERANCE});"
+        " orthonormalise it, or check the layout"
+    )
+
+
+@jax.jit
+def _worst(rotations: Array) -> tuple[Array, Array]:
+    """The largest deviation from R Rᵀ = I and det R = 1, and the flat index of its matrix; NaN counts as largest."""
+    gram = compose(rotations, jnp.swapaxes(rotations, -1, -2)) - jnp.eye(3, dtype=rotations.dtype)
+    volume = jnp.sum(jnp.cross(rotations[..., 0, :], rotations[..., 1, :]) * rotations[..., 2, :], axis=-1)
+    deviation = jnp.maximum(jnp.max(jnp.abs(gram), axis=(-2, -1)), jnp.abs(volume - 1)).ravel()
+    where = jnp.argmax(deviation)
+    return deviation[where], where
