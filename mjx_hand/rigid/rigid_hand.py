@@ -92,9 +92,16 @@ def chain(
 
 def finger_tips(angles: Float[Array, "*b 20"], rigid: RigidHand) -> Float[Array, "*b 5 3"]:
     """Finger-tip positions (m) in the wrist's frame."""
-    rot, pos = forward_kinematics(angles, rigid)
+    return tip_positions(*forward_kinematics(angles, rigid), rigid)
+
+
+def tip_positions(
+    link_rotation: Float[Array, "*b 16 3 3"], link_position: Float[Array, "*b 16 3"], rigid: RigidHand
+) -> Float[Array, "*b 5 3"]:
+    """Finger-tip positions (m) of links that stand at these rotations and positions."""
     tips = list(TIP_LINKS)
-    return pos[..., tips, :] + jnp.einsum("...fij,fj->...fi", rot[..., tips, :, :], jnp.asarray(rigid.tip_offset))
+    reach = jnp.einsum("...fij,fj->...fi", link_rotation[..., tips, :, :], jnp.asarray(rigid.tip_offset))
+    return link_position[..., tips, :] + reach
 
 
 def stack_hands(hands: Sequence[RigidHand]) -> RigidHand:

@@ -1,0 +1,102 @@
+"""DexMV hand recordings (Qin et al., ECCV 2022, https://yzqin.github.io/dexmv), as one `.npz` a sequence.
+
+Metres and radians, in the camera's frame (about x right, y down, z forward), one right hand:
+
+- `mano` (T, 61): 16 axis-angles about the *flat* hand (root, index, middle, pinky, ring, thumb, three joints each),
+  ten shape coefficients, and the wrist joint's position.
+- `joint_transforms` (T, 16, 4, 4): each joint's frame in the camera's frame, in the order that
+  `joint_transform_order` names.
+
+The transforms carry the subject's own joint centres, so no licensed MANO file is needed. Shape and bone lengths were
+estimated frame by frame and jitter; one hand has one of each, so both are medians over the frames.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation
+
+from mjx_hand.capture.datasets.dataset_format import Arrays, DatasetFormat
+from mjx_hand.errors import InputError
+from mjx_hand.hand.joints import LINKS, PARENTS
+from mjx_hand.motion import Motion, check_motion
+from mjx_hand.motion.resample import matrix_quaternions
+
+FPS = 25.0  # of every published sequence; the files do not say
+_NEEDED = ("mano", "joint_transforms", "joint_transform_order")
+# Pose and transforms are two accounts of the same rotations, equal to rounding where the joint order is understood.
+_AGREEMENT = 1e-3
+
+
+def _recognises(path: Path, arrays: Arrays) -> bool:
+    return all(name in arrays for name in _NEEDED)
+
+
+def link_offsets_by_frame(transforms: Float[np.ndarray, "t 16 4 4"]) -> Float[np.ndarray, "t 16 3"]:
+    """Each joint's centre in its parent's frame (m), from global transforms in the order of `LINKS`; wrist zero."""
+    parents = list(PARENTS[1:])
+    step = transforms[:, 1:, :3, 3] - transforms[:, parents, :3, 3]
+    offsets = np.zeros((len(transforms), len(LINKS), 3))
+    offsets[:, 1:] = np.einsum("tlji,tlj->tli", transforms[:, parents, :3, :3], step)
+    return offsets
+
+
+def ordered_transforms(path: Path, arrays: Arrays) -> Float[np.ndarray, "t 16 4 4"]:
+    """The joints' global transforms in the order of `LINKS`.
+
+    Raises:
+        InputError: their shape or the joints' names are not DexMV's.
+    """
+    transforms = np.asarray(arrays["joint_transforms"], dtype=float)
+    names = [str(name) for name in np.atleast_1d(arrays["joint_transform_order"])]
+    if sorted(names) != sorted(LINKS):
+        raise InputError(f"{path}: joint_transform_order names {', '.join(names)}; expected {', '.join(LINKS)}")
+    if transforms.ndim != 4 or transforms.shape[1:] != (16, 4, 4):
+        raise InputError(f"{path}: joint_transforms has shape {transforms.shape}, expected (frames, 16, 4, 4)")
+    return transforms[:, [names.index(link) for link in LINKS]]
+
+
+def _read(path: Path, arrays: Arrays) -> Motion:
+    mano = np.asarray(arrays["mano"], dtype=float)
+    if mano.ndim != 2 or mano.shape[1] != 61:
+        raise InputError(f"{path}: mano has shape {mano.shape}, expected (frames, 61)")
+    transforms = ordered_transforms(path, arrays)
+    frames = len(mano)
+    if len(transforms) != frames:
+        raise InputError(f"{path}: mano has {frames} frames and joint_transforms {len(transforms)}; expected as many")
+    values = np.concatenate([mano, transforms.reshape(frames, -1)], axis=1)
+    valid = np.asarray(np.isfinite(values).all(axis=1))
+    if not valid.any():
+        raise InputError(f"{path}: none of its {frames} frames is finite; nothing to read")
+
+    pose = np.where(valid[:, None], mano[:, :48], 0.0).reshape(-1, 3)
+    rotations = Rotation.from_rotvec(pose).as_matrix().reshape(frames, 16, 3, 3)
+    seen = transforms[valid]
+    in_parent = np.swapaxes(seen[:, list(PARENTS[1:]), :3, :3], -1, -2) @ seen[:, 1:, :3, :3]
+    gap = np.abs(in_parent - rotations[valid, 1:]).max()
+    if gap > _AGREEMENT:
+        raise InputError(
+            f"{path}: pose and joint_transforms differ by up to {gap:.2g} in a matrix entry; "
+            "expected 48 axis-angle values about the flat hand (root, index, middle, pinky, ring, thumb)"
+        )
+    return check_motion(
+        Motion(
+            fps=FPS,
+            rotations=rotations[:, 1:],
+            wrist_position=np.where(valid[:, None], transforms[:, 0, :3, 3], 0.0),
+            wrist_quaternion=matrix_quaternions(rotations[:, 0]),
+            shape=np.median(mano[valid, 48:58], axis=0),
+            valid=valid,
+            link_offset=np.median(link_offsets_by_frame(seen), axis=0),
+            side="right",
+            source=f"DexMV {path.name}",
+        )
+    )
+
+
+FORMAT = DatasetFormat(
+    name=f"DexMV (.npz with {', '.join(_NEEDED)})",
+    recognises=_recognises,
+    read=_read,
+)
