@@ -16,8 +16,8 @@ _DAMPING = 0.02  # of the mean squared weight: keeps directions that the skin do
 
 
 def phalanx_capsules(
-    points: list[Float[np.ndarray, "p 3"]],
-    areas: list[Float[np.ndarray, "p"]],
+    points: list[Float[np.ndarray, "_ 3"]],
+    areas: list[Float[np.ndarray, "_"]],
     centres: Float[np.ndarray, "16 3"],
     tips: Float[np.ndarray, "5 3"],
 ) -> Capsules:

@@ -55,12 +55,12 @@ class RigidHand:
     name: str = static()
 
 
-def joint_rotations(angles: Float[Array, "*b 20"], rigid: RigidHand) -> Float[Array, "*b 15 3 3"]:
+def joint_rotations(angles: Float[Array | np.ndarray, "*b 20"], rigid: RigidHand) -> Float[Array, "*b 15 3 3"]:
     """Rotations of the 15 MANO joints that the 20 hinge angles (rad) produce.
 
     The inverse of `project` on the rotations that the hinges can reach.
     """
-    hinge = axis_angle_matrix(jnp.asarray(rigid.hinge_axis), angles)  # (*b, 20, 3, 3)
+    hinge = axis_angle_matrix(jnp.asarray(rigid.hinge_axis), jnp.asarray(angles))  # (*b, 20, 3, 3)
     out = []
     for link in range(1, 16):
         mine = [h for h in range(NUM_HINGES) if HINGE_LINKS[h] == link]
@@ -70,7 +70,7 @@ def joint_rotations(angles: Float[Array, "*b 20"], rigid: RigidHand) -> Float[Ar
 
 
 def forward_kinematics(
-    angles: Float[Array, "*b 20"], rigid: RigidHand
+    angles: Float[Array | np.ndarray, "*b 20"], rigid: RigidHand
 ) -> tuple[Float[Array, "*b 16 3 3"], Float[Array, "*b 16 3"]]:
     """Link rotations and positions (m) in the wrist's frame: its origin is the wrist joint."""
     rotations = joint_rotations(angles, rigid)
@@ -90,7 +90,7 @@ def chain(
     return jnp.stack(rot, axis=-3), jnp.stack(pos, axis=-2)
 
 
-def finger_tips(angles: Float[Array, "*b 20"], rigid: RigidHand) -> Float[Array, "*b 5 3"]:
+def finger_tips(angles: Float[Array | np.ndarray, "*b 20"], rigid: RigidHand) -> Float[Array, "*b 5 3"]:
     """Finger-tip positions (m) in the wrist's frame."""
     return tip_positions(*forward_kinematics(angles, rigid), rigid)
 

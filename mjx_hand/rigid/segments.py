@@ -29,7 +29,7 @@ class Piece:
 
     vertex_ids: Int[np.ndarray, "n"]
     faces: Int[np.ndarray, "f 3"]
-    loops: tuple[Int[np.ndarray, "l"], ...]
+    loops: tuple[Int[np.ndarray, "_"], ...]
     num_skin_faces: int
 
     def vertices(self, whole: Float[np.ndarray, "v 3"]) -> Float[np.ndarray, "m 3"]:
@@ -83,7 +83,7 @@ def _islands(labels: Int[np.ndarray, "f"], pairs: Int[np.ndarray, "e 2"]) -> lis
     return islands
 
 
-def border_loops(faces: Int[np.ndarray, "f 3"]) -> list[Int[np.ndarray, "l"]]:
+def border_loops(faces: Int[np.ndarray, "f 3"]) -> list[Int[np.ndarray, "_"]]:
     """Simple closed loops of the edges that only one face has, in the faces' direction.
 
     A vertex that the border passes twice splits it into separate loops: closing each then leaves every edge two faces.
