@@ -40,7 +40,8 @@ def replacing(path: str | Path) -> Iterator[Path]:
 def save_arrays(path: str | Path, schema: str, arrays: Mapping[str, np.ndarray | float | str]) -> None:
     """Write named arrays as a compressed `.npz` with its schema."""
     with replacing(path) as temporary, temporary.open("wb") as file:
-        np.savez_compressed(file, schema=np.array(schema), **{k: np.asarray(v) for k, v in arrays.items()})
+        stored = {name: np.asarray(value) for name, value in arrays.items()}
+        np.savez_compressed(file, allow_pickle=False, schema=np.array(schema), **stored)
 
 
 def open_arrays(path: str | Path) -> dict[str, np.ndarray]:

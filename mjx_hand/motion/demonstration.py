@@ -8,11 +8,20 @@ from jaxtyping import Float
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import HINGES
 from mjx_hand.motion.archive import load_arrays, save_arrays
-from mjx_hand.motion.joint_motion import JointMotion
+from mjx_hand.motion.joint_motion import JointMotion, joint_motion_of
+from mjx_hand.motion.layout import numbers, text
 from mjx_hand.pytree import pytree, static
 
 SCHEMA = "mjx-hand/demonstration/1"
 OBJECT_KINDS = ("box", "sphere", "cylinder")
+_LAYOUT: dict[str, tuple[int | str, ...]] = {
+    "object_size": (3,),
+    "object_mass": (),
+    "object_friction": (),
+    "support": (3,),
+    "support_position": (3,),
+    "shape": ("s",),
+}
 
 
 @pytree
@@ -96,34 +105,24 @@ def load_demonstration(path: str | Path) -> Demonstration:
         InputError: not such a file, of another joint order, or with frames that do not match.
     """
     a = load_arrays(path, SCHEMA)
-    if tuple(a.get("joint_names", ())) != HINGES:
-        raise InputError(f"{path}: its joint names are not this version's; make the demonstration again")
-    source = str(a["source"])
-    motion = JointMotion(
-        fps=float(a["fps"]),
-        angles=a["angles"],
-        wrist_position=a["wrist_position"],
-        wrist_quaternion=a["wrist_quaternion"],
-        valid=a["valid"].astype(bool),
-        side=str(a["side"]),
-        source=source,
-    )
-    if a["object_pose"].shape != (motion.num_frames, 7):
-        raise InputError(
-            f"{path}: object_pose has shape {a['object_pose'].shape}, expected ({motion.num_frames}, 7) as the hand"
-        )
+    source = text(path, a, "source")
+    motion = joint_motion_of(path, a, source)
+    n = numbers(path, a, _LAYOUT | {"object_pose": (motion.num_frames, 7)})
+    kind = text(path, a, "object_kind")
+    if kind not in OBJECT_KINDS:
+        raise InputError(f"{path}: object_kind is {kind!r}; known: {', '.join(OBJECT_KINDS)}")
     return Demonstration(
         motion=motion,
-        object_pose=a["object_pose"],
+        object_pose=n["object_pose"],
         object=ObjectDescription(
-            kind=str(a["object_kind"]),
-            size=a["object_size"],
-            mass=float(a["object_mass"]),
-            friction=float(a["object_friction"]),
+            kind=kind,
+            size=n["object_size"],
+            mass=float(n["object_mass"]),
+            friction=float(n["object_friction"]),
         ),
-        support=a["support"],
-        support_position=a["support_position"],
-        shape=a["shape"],
-        grasp=str(a["grasp"]),
+        support=n["support"],
+        support_position=n["support_position"],
+        shape=n["shape"],
+        grasp=text(path, a, "grasp"),
         source=source,
     )

@@ -1,16 +1,25 @@
 """`JointMotion`: a motion projected onto the 20 hinges of a rigid hand."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from mjx_hand.errors import InputError
-from mjx_hand.hand.joints import HINGES
+from mjx_hand.hand.joints import HINGES, NUM_HINGES
 from mjx_hand.motion.archive import load_arrays, save_arrays
+from mjx_hand.motion.layout import numbers, text
 from mjx_hand.pytree import pytree, static
 
 SCHEMA = "mjx-hand/joint-motion/1"
+LAYOUT: dict[str, tuple[int | str, ...]] = {
+    "fps": (),
+    "angles": ("t", NUM_HINGES),
+    "wrist_position": ("t", 3),
+    "wrist_quaternion": ("t", 4),
+    "valid": ("t",),
+}
 
 
 @pytree
@@ -65,14 +74,30 @@ def load_joint_motion(path: str | Path) -> JointMotion:
         InputError: not such a file, or made for another joint order.
     """
     a = load_arrays(path, SCHEMA)
-    if tuple(a.get("joint_names", ())) != HINGES:
-        raise InputError(f"{path}: its joint names are not this version's; retarget the recording again")
+    return joint_motion_of(path, a, text(path, a, "source"))
+
+
+def joint_motion_of(path: str | Path, arrays: Mapping[str, np.ndarray], source: str) -> JointMotion:
+    """The joint motion among a file's arrays, checked.
+
+    Raises:
+        InputError: arrays are missing, unsound, or made for another joint order.
+    """
+    if tuple(arrays.get("joint_names", ())) != HINGES:
+        raise InputError(f"{path}: its joint names are not this version's; make it again from the recording")
+    n = numbers(path, arrays, LAYOUT)
+    fps, side = float(n["fps"]), text(path, arrays, "side")
+    if len(n["angles"]) == 0 or fps <= 0 or side not in ("right", "left"):
+        raise InputError(
+            f"{path}: {len(n['angles'])} frames at {fps} frames a second of a {side!r} hand; "
+            "expected at least one frame, a positive rate, and 'right' or 'left'"
+        )
     return JointMotion(
-        fps=float(a["fps"]),
-        angles=a["angles"],
-        wrist_position=a["wrist_position"],
-        wrist_quaternion=a["wrist_quaternion"],
-        valid=a["valid"].astype(bool),
-        side=str(a["side"]),
-        source=str(a["source"]),
+        fps=fps,
+        angles=n["angles"],
+        wrist_position=n["wrist_position"],
+        wrist_quaternion=n["wrist_quaternion"],
+        valid=n["valid"].astype(bool),
+        side=side,
+        source=source,
     )

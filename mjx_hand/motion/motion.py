@@ -6,10 +6,20 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from mjx_hand.errors import InputError
+from mjx_hand.hand.joints import NUM_BALL_JOINTS, NUM_LINKS
 from mjx_hand.motion.archive import load_arrays, save_arrays
+from mjx_hand.motion.layout import numbers, text
 from mjx_hand.pytree import pytree, static
 
 SCHEMA = "mjx-hand/motion/1"
+LAYOUT: dict[str, tuple[int | str, ...]] = {
+    "fps": (),
+    "rotations": ("t", NUM_BALL_JOINTS, 3, 3),
+    "wrist_position": ("t", 3),
+    "wrist_quaternion": ("t", 4),
+    "shape": ("s",),
+    "valid": ("t",),
+}
 
 
 @pytree
@@ -48,7 +58,7 @@ def check_motion(motion: Motion) -> Motion:
     """Return `motion` if it is well formed.
 
     Raises:
-        InputError: it is empty, or shapes, rotations, quaternions, fps or side are not valid.
+        InputError: it is empty, or shapes, rotations, quaternions, bones, fps or side are not valid.
     """
     name = motion.source or "motion"
     frames = motion.rotations.shape[0]
@@ -78,6 +88,15 @@ def check_motion(motion: Motion) -> Motion:
                 f"{name}: {field} has NaN or infinity in {bad.sum()} frames, first {int(np.argmax(bad))}; "
                 "mark gaps as valid=False and hold the identity there"
             )
+    length = np.linalg.norm(motion.wrist_quaternion, axis=1)
+    if (np.abs(length - 1) > 1e-3).any():
+        worst = int(np.argmax(np.abs(length - 1)))
+        raise InputError(f"{name}: frame {worst}'s wrist_quaternion has length {length[worst]:.3g}, expected 1 (wxyz)")
+    if np.ndim(motion.shape) != 1 or not np.isfinite(motion.shape).all():
+        raise InputError(f"{name}: shape has dimensions {np.shape(motion.shape)}; expected a list of finite numbers")
+    offset = motion.link_offset
+    if offset is not None and (np.shape(offset) != (NUM_LINKS, 3) or not np.isfinite(offset).all()):
+        raise InputError(f"{name}: link_offset has shape {np.shape(offset)}; expected ({NUM_LINKS}, 3), all finite")
     r = motion.rotations[good]
     off = np.abs(r @ np.swapaxes(r, -1, -2) - np.eye(3)).max(axis=(1, 2, 3))
     flipped = np.linalg.det(r).min(axis=1) < 0
@@ -105,20 +124,24 @@ def save_motion(motion: Motion, path: str | Path) -> None:
 
 
 def load_motion_file(path: str | Path) -> Motion:
-    """Read a motion that `save_motion` wrote, checked."""
+    """Read a motion that `save_motion` wrote.
+
+    Raises:
+        InputError: not such a file, or its contents are not a well-formed motion.
+    """
     a = load_arrays(path, SCHEMA)
-    try:
-        motion = Motion(
-            fps=float(a["fps"]),
-            rotations=a["rotations"],
-            wrist_position=a["wrist_position"],
-            wrist_quaternion=a["wrist_quaternion"],
-            shape=a["shape"],
-            valid=a["valid"].astype(bool),
-            link_offset=a.get("link_offset"),
-            side=str(a["side"]),
-            source=str(a["source"]),
+    n = numbers(path, a, LAYOUT)
+    offset = numbers(path, a, {"link_offset": (NUM_LINKS, 3)})["link_offset"] if "link_offset" in a else None
+    return check_motion(
+        Motion(
+            fps=float(n["fps"]),
+            rotations=n["rotations"],
+            wrist_position=n["wrist_position"],
+            wrist_quaternion=n["wrist_quaternion"],
+            shape=n["shape"],
+            valid=n["valid"].astype(bool),
+            link_offset=offset,
+            side=text(path, a, "side"),
+            source=text(path, a, "source"),
         )
-    except KeyError as error:
-        raise InputError(f"{path}: a motion file without {error.args[0]!r}") from None
-    return check_motion(motion)
+    )

@@ -21,6 +21,7 @@ from mjx_hand.capture.datasets.dataset_format import Arrays, DatasetFormat
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import LINKS, PARENTS
 from mjx_hand.motion import Motion, check_motion
+from mjx_hand.motion.layout import numbers
 from mjx_hand.motion.resample import matrix_quaternions
 
 FPS = 25.0  # of every published sequence; the files do not say
@@ -35,10 +36,10 @@ def _recognises(path: Path, arrays: Arrays) -> bool:
 
 def link_offsets_by_frame(transforms: Float[np.ndarray, "t 16 4 4"]) -> Float[np.ndarray, "t 16 3"]:
     """Each joint's centre in its parent's frame (m), from global transforms in the order of `LINKS`; wrist zero."""
-    parents = list(PARENTS[1:])
-    step = transforms[:, 1:, :3, 3] - transforms[:, parents, :3, 3]
+    parents = transforms[:, list(PARENTS[1:])]
+    step = transforms[:, 1:, :3, 3] - parents[..., :3, 3]
     offsets = np.zeros((len(transforms), len(LINKS), 3))
-    offsets[:, 1:] = np.einsum("tlji,tlj->tli", transforms[:, parents, :3, :3], step)
+    offsets[:, 1:] = np.einsum("tlji,tlj->tli", parents[..., :3, :3], step)
     return offsets
 
 
@@ -48,24 +49,18 @@ def ordered_transforms(path: Path, arrays: Arrays) -> Float[np.ndarray, "t 16 4 
     Raises:
         InputError: their shape or the joints' names are not DexMV's.
     """
-    transforms = np.asarray(arrays["joint_transforms"], dtype=float)
     names = [str(name) for name in np.atleast_1d(arrays["joint_transform_order"])]
     if sorted(names) != sorted(LINKS):
         raise InputError(f"{path}: joint_transform_order names {', '.join(names)}; expected {', '.join(LINKS)}")
-    if transforms.ndim != 4 or transforms.shape[1:] != (16, 4, 4):
-        raise InputError(f"{path}: joint_transforms has shape {transforms.shape}, expected (frames, 16, 4, 4)")
-    return transforms[:, [names.index(link) for link in LINKS]]
+    transforms = numbers(path, arrays, {"joint_transforms": ("t", len(LINKS), 4, 4)}, finite=False)["joint_transforms"]
+    return transforms[:, [names.index(link) for link in LINKS]].astype(float)
 
 
 def _read(path: Path, arrays: Arrays) -> Motion:
-    mano = np.asarray(arrays["mano"], dtype=float)
-    if mano.ndim != 2 or mano.shape[1] != 61:
-        raise InputError(f"{path}: mano has shape {mano.shape}, expected (frames, 61)")
     transforms = ordered_transforms(path, arrays)
-    frames = len(mano)
-    if len(transforms) != frames:
-        raise InputError(f"{path}: mano has {frames} frames and joint_transforms {len(transforms)}; expected as many")
-    values = np.concatenate([mano, transforms.reshape(frames, -1)], axis=1)
+    frames = len(transforms)
+    mano = numbers(path, arrays, {"mano": (frames, 61)}, finite=False)["mano"].astype(float)
+    values = np.concatenate([mano, transforms.reshape(frames, len(LINKS) * 16)], axis=1)
     valid = np.asarray(np.isfinite(values).all(axis=1))
     if not valid.any():
         raise InputError(f"{path}: none of its {frames} frames is finite; nothing to read")
@@ -73,7 +68,7 @@ def _read(path: Path, arrays: Arrays) -> Motion:
     pose = np.where(valid[:, None], mano[:, :48], 0.0).reshape(-1, 3)
     rotations = Rotation.from_rotvec(pose).as_matrix().reshape(frames, 16, 3, 3)
     seen = transforms[valid]
-    in_parent = np.swapaxes(seen[:, list(PARENTS[1:]), :3, :3], -1, -2) @ seen[:, 1:, :3, :3]
+    in_parent = np.swapaxes(seen[:, list(PARENTS[1:])], -1, -2)[..., :3, :3] @ seen[:, 1:, :3, :3]
     gap = np.abs(in_parent - rotations[valid, 1:]).max()
     if gap > _AGREEMENT:
         raise InputError(

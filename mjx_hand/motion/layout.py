@@ -1,0 +1,62 @@
+"""Checks of a file's arrays before anything is made of them."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from mjx_hand.errors import InputError
+
+Dimension = int | str
+
+
+def numbers(
+    path: str | Path,
+    arrays: Mapping[str, np.ndarray],
+    layout: Mapping[str, tuple[Dimension, ...]],
+    *,
+    finite: bool = True,
+) -> dict[str, np.ndarray]:
+    """The arrays that `layout` names, if each is there, numeric and of its shape.
+
+    Args:
+        path: for the messages.
+        arrays: what the file holds.
+        layout: each array's shape; a letter stands for one length, the same wherever it occurs.
+        finite: refuse NaN and infinity too.
+
+    Raises:
+        InputError: an array is missing, is not numeric, or has another shape or, if asked for, NaN.
+    """
+    sizes: dict[str, int] = {}
+    found = {}
+    for name, wanted in layout.items():
+        if name not in arrays:
+            raise InputError(f"{path}: has no {name!r}; it needs {', '.join(layout)}")
+        value = np.asarray(arrays[name])
+        if value.dtype.kind not in "fiub":
+            raise InputError(f"{path}: {name} holds {value.dtype}, expected numbers")
+        known = [sizes.get(d, d) if isinstance(d, str) else d for d in wanted]
+        fits = value.ndim == len(known) and all(
+            isinstance(k, str) or k == n for k, n in zip(known, value.shape, strict=True)
+        )
+        if not fits:
+            expected = ", ".join(map(str, known))
+            raise InputError(f"{path}: {name} has shape {value.shape}, expected ({expected})")
+        sizes |= {d: n for d, n in zip(wanted, value.shape, strict=True) if isinstance(d, str)}
+        if finite and not np.isfinite(value).all():
+            where = tuple(int(i) for i in np.argwhere(~np.isfinite(value))[0])
+            raise InputError(f"{path}: {name} has NaN or infinity, first at {where}; mend or leave out those frames")
+        found[name] = value
+    return found
+
+
+def text(path: str | Path, arrays: Mapping[str, np.ndarray], name: str) -> str:
+    """The string of that name.
+
+    Raises:
+        InputError: it is missing.
+    """
+    if name not in arrays:
+        raise InputError(f"{path}: has no {name!r}")
+    return str(arrays[name])

@@ -1,0 +1,61 @@
+"""`load_motion`: what it recognises, and what it says to everything else."""
+
+import numpy as np
+import pytest
+
+from mjx_hand.capture.datasets.dataset_format import dataset_formats
+from mjx_hand.capture.load import load_motion
+from mjx_hand.errors import InputError
+from mjx_hand.motion import JointMotion, Motion, save_joint_motion, save_motion
+
+
+def flat_motion(frames: int = 4) -> Motion:
+    return Motion(
+        fps=50.0,
+        rotations=np.tile(np.eye(3), (frames, 15, 1, 1)),
+        wrist_position=np.zeros((frames, 3)),
+        wrist_quaternion=np.tile([1.0, 0, 0, 0], (frames, 1)),
+        shape=np.zeros(10),
+        valid=np.ones(frames, bool),
+    )
+
+
+def test_own_motion_file_is_recognised(tmp_path):
+    save_motion(flat_motion(), tmp_path / "motion.npz")
+    assert load_motion(tmp_path / "motion.npz").fps == 50.0
+
+
+def test_every_module_of_the_package_is_found():
+    assert [f.name.split()[0] for f in dataset_formats()] == ["DexMV", "mjx-hand"]
+
+
+def test_joint_motion_is_named_as_what_it_is(tmp_path):
+    four = np.zeros((4, 20)), np.zeros((4, 3)), np.tile([1.0, 0, 0, 0], (4, 1)), np.ones(4, bool)
+    motion = JointMotion(fps=50.0, angles=four[0], wrist_position=four[1], wrist_quaternion=four[2], valid=four[3])
+    save_joint_motion(motion, tmp_path / "angles.npz")
+    with pytest.raises(InputError, match="of schema mjx-hand/joint-motion/1, not a motion"):
+        load_motion(tmp_path / "angles.npz")
+
+
+def test_refusals_name_what_was_found_and_what_is_read(tmp_path):
+    (tmp_path / "empty.npz").touch()
+    (tmp_path / "text.npz").write_text("not an archive")
+    (tmp_path / "marks.c3d").write_bytes(b"\x02P")
+    (tmp_path / "pose.pkl").write_bytes(b"\x80\x04N.")
+    np.savez(tmp_path / "other.npz", **{f"a{k}": np.zeros(2) for k in range(8)})
+    np.savez(tmp_path / "pickled.npz", a=np.array([{}], dtype=object))
+    expected = {
+        "gone.npz": "no such file",
+        "": "a folder",
+        "empty.npz": "the file is empty",
+        "text.npz": "not a readable .npz file",
+        "marks.c3d": "a marker recording, which needs a fit first; formats read: DexMV",
+        "pose.pkl": "suffix .pkl",
+        "other.npz": "an .npz of a0, a1, a2, a3, a4, a5 and more; formats read: DexMV",
+        "pickled.npz": "not a readable .npz file",
+    }
+    for name, message in expected.items():
+        with pytest.raises(InputError) as refusal:
+            load_motion(tmp_path / name)
+        assert message in str(refusal.value)
+        assert "\n" not in str(refusal.value)
