@@ -23,11 +23,14 @@ def vee(m: Float[Array, "*b 3 3"]) -> Float[Array, "*b 3"]:
     return jnp.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
 
 
-def axis_angle_matrix(axis: Float[Array, "*b 3"], angle: Float[Array, "*b"]) -> Float[Array, "*b 3 3"]:
-    """The rotation by `angle` (rad) about the unit vector `axis` (Rodrigues' formula); the two broadcast."""
-    k = hat(axis)
+def axis_angle_matrix(axis: Float[Array, "*#b 3"], angle: Float[Array, "*#b"]) -> Float[Array, "*b 3 3"]:
+    """The rotation by `angle` (rad) about the unit vector `axis` (Rodrigues' formula); the two broadcast.
+
+    As sums of products, without a matrix product, which some accelerators round to fewer digits.
+    """
     s, c = jnp.sin(angle)[..., None, None], jnp.cos(angle)[..., None, None]
-    return jnp.eye(3, dtype=k.dtype) + s * k + (1 - c) * (k @ k)
+    outer = axis[..., :, None] * axis[..., None, :]
+    return c * jnp.eye(3, dtype=axis.dtype) + s * hat(axis) + (1 - c) * outer
 
 
 def exp(v: Float[Array, "*b 3"]) -> Float[Array, "*b 3 3"]:
@@ -48,6 +51,11 @@ def matrix_to_quaternion(r: Float[Array, "*b 3 3"]) -> Float[Array, "*b 4"]:
 def quaternion_to_matrix(q: Float[Array, "*b 4"]) -> Float[Array, "*b 3 3"]:
     """Quaternion wxyz, normalised here, to matrix."""
     return jaxlie.SO3(q).normalize().as_matrix()
+
+
+def quaternion_difference(a: Float[Array, "*b 4"], b: Float[Array, "*b 4"]) -> Float[Array, "*b 3"]:
+    """Rotation vector (rad, in a's own axes) of the turn that takes orientation a to b; both wxyz."""
+    return (jaxlie.SO3(a).inverse() @ jaxlie.SO3(b)).log()
 
 
 def geodesic_angle(a: Float[Array, "*b 3 3"], b: Float[Array, "*b 3 3"]) -> Float[Array, "*b"]:

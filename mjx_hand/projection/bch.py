@@ -1,6 +1,7 @@
 """What the paper's iteration would need: the Baker-Campbell-Hausdorff series one order further."""
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from mjx_hand.projection.naive import naive_two_dof
@@ -11,7 +12,9 @@ ITERATIONS = 4  # the fourth changes less than the terms that the series leaves 
 
 
 def bch2_two_dof(
-    rotation: Float[Array, "*b 3 3"], first_axis: Float[Array, "*#b 3"], second_axis: Float[Array, "*#b 3"]
+    rotation: Float[Array | np.ndarray, "*#b 3 3"],
+    first_axis: Float[Array | np.ndarray, "*#b 3"],
+    second_axis: Float[Array | np.ndarray, "*#b 3"],
 ) -> tuple[Float[Array, "*b"], Float[Array, "*b"]]:
     """(φ, θ) (rad) by iteration on the series of log(R_a1(φ) R_a2(θ)) up to the terms of third order.
 
@@ -19,7 +22,7 @@ def bch2_two_dof(
     -φ²θ/12 a2 and -φθ²/12 a1: the first corrections that lie along the axes. Each step removes the part of the
     residual that the axes span. Good for small angles; the exact closed form is better and cheaper.
     """
-    first_axis, second_axis = jnp.asarray(first_axis), jnp.asarray(second_axis)
+    rotation, first_axis, second_axis = jnp.asarray(rotation), jnp.asarray(first_axis), jnp.asarray(second_axis)
     omega = log(rotation)
     across = jnp.cross(first_axis, second_axis)
     first_across, second_across = jnp.cross(first_axis, across), jnp.cross(second_axis, across)

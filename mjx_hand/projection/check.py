@@ -3,7 +3,8 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jax.core import Tracer
+from jaxtyping import Array, Float, Shaped
 
 from mjx_hand.errors import InputError
 from mjx_hand.projection.products import compose
@@ -11,27 +12,22 @@ from mjx_hand.projection.products import compose
 TOLERANCE = 1e-3  # of R Rᵀ - I and of det R - 1: looser than float32 rounding, tighter than any real mistake
 
 
-def check_rotations(rotations: Array | np.ndarray, joints: int) -> Float[Array, "*b joints 3 3"]:
-    """The rotations as a floating array; values are looked at only where they are known (not while tracing).
+def check_rotations(rotations: Shaped[Array | np.ndarray, "..."], joints: int) -> Float[Array, "*b {joints} 3 3"]:
+    """The rotations as a floating JAX array; values are looked at only where they are known (not while tracing).
 
     Raises:
-        InputError: for another shape, or matrices that are not rotations.
+        InputError: for another shape or type, or for matrices that are not rotations.
     """
-    wanted = f"rotations have shape (..., {joints}, 3, 3)"
-    if not isinstance(rotations, jax.Array):
-        try:
-            rotations = np.asarray(rotations)
-        except ValueError as error:
-            raise InputError(f"the rotations given are ragged; {wanted}") from error
-        if rotations.dtype.kind not in "fiu":
-            raise InputError(f"the rotations given are of type {rotations.dtype}; real numbers are needed")
-    array = jnp.asarray(rotations)
-    if array.shape[-3:] != (joints, 3, 3):
-        hint = "; convert axis-angle poses with mjx_hand.rotations.exp" if array.shape[-1:] in ((3,), (45,)) else ""
-        raise InputError(f"the rotations given have shape {array.shape}; {wanted}{hint}")
-    if not jnp.issubdtype(array.dtype, jnp.floating):
-        array = array.astype(jnp.float32)
-    if not isinstance(array, jax.core.Tracer) and array.size:
+    if rotations.dtype.kind not in "fiu":
+        raise InputError(f"the rotations given are of type {rotations.dtype}; real numbers are needed")
+    if rotations.shape[-3:] != (joints, 3, 3):
+        hint = "; turn axis-angle poses into matrices with mjx_hand.rotations.exp"
+        raise InputError(
+            f"the rotations given have shape {rotations.shape}; the shape must be (..., {joints}, 3, 3)"
+            + (hint if rotations.shape[-1:] in ((3,), (45,)) else "")
+        )
+    array = jnp.asarray(rotations, None if rotations.dtype.kind == "f" else jnp.float32)
+    if not isinstance(array, Tracer) and array.size:
         _check_values(array)
     return array
 

@@ -1,13 +1,16 @@
 """The exact projection of a rotation onto one hinge: docs/projection.md, section 1."""
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from mjx_hand.projection.products import dot, turn
 from mjx_hand.rotations import vee
 
 
-def project_one_dof(rotation: Float[Array, "*b 3 3"], axis: Float[Array, "*#b 3"]) -> Float[Array, "*b"]:
+def project_one_dof(
+    rotation: Float[Array | np.ndarray, "*#b 3 3"], axis: Float[Array | np.ndarray, "*#b 3"]
+) -> Float[Array, "*b"]:
     """The angle θ (rad, in (-π, π]) that minimises ‖R - R_a(θ)‖_F.
 
     θ = atan2(2 a·vee(R), tr R - a·Ra): the twist of R about a. The paper's formula (arXiv 2512.07359) has tr R - 1
@@ -25,7 +28,7 @@ def project_one_dof(rotation: Float[Array, "*b 3 3"], axis: Float[Array, "*#b 3"
     return direction_angle(sine, cosine)
 
 
-def direction_angle(sine: Float[Array, "*b"], cosine: Float[Array, "*b"]) -> Float[Array, "*b"]:
+def direction_angle(sine: Float[Array, "*#b"], cosine: Float[Array, "*#b"]) -> Float[Array, "*b"]:
     """atan2 in (-π, π]; where both arguments vanish to rounding, the angle is 0 and so is its gradient."""
     vanishes = jnp.hypot(sine, cosine) < 8 * jnp.finfo(sine.dtype).eps
     # atan2 sees (0, 1) there, so that its gradient's division by zero cannot reach the caller as NaN.

@@ -4,7 +4,8 @@ from functools import partial
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+import numpy as np
+from jaxtyping import Array, Float, Shaped
 
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import FINGERS, NUM_BALL_JOINTS, NUM_HINGES
@@ -25,13 +26,15 @@ METHODS = {
 }
 
 
-def project(rotations: Float[Array, "*b 15 3 3"], rigid: RigidHand, method: str = "exact") -> Float[Array, "*b 20"]:
+def project(
+    rotations: Shaped[Array | np.ndarray, "..."], rigid: RigidHand, method: str = "exact"
+) -> Float[Array, "*b 20"]:
     """The hinge angles (rad) whose joint rotations come nearest to `rotations`, joint by joint.
 
     The inverse of `joint_rotations` on what the hinges can reach. Limits are not applied.
 
     Args:
-        rotations: the pose, each joint's rotation relative to its parent, in MANO's order.
+        rotations: the pose, (..., 15, 3, 3): each joint's rotation relative to its parent, in MANO's order.
         rigid: the hand whose `hinge_axis` is used.
         method: "exact", the least-squares solution in closed form; the others are for comparison: "paper",
             arXiv 2512.07359 as printed; "bch2", its iteration one order further; "naive", the logarithm's components.

@@ -1,6 +1,7 @@
 """The exact projection of a rotation onto two hinges in series: docs/projection.md, section 2."""
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from mjx_hand.projection.one_dof import direction_angle, project_one_dof
@@ -9,7 +10,9 @@ from mjx_hand.rotations import axis_angle_matrix
 
 
 def project_two_dof(
-    rotation: Float[Array, "*b 3 3"], first_axis: Float[Array, "*#b 3"], second_axis: Float[Array, "*#b 3"]
+    rotation: Float[Array | np.ndarray, "*#b 3 3"],
+    first_axis: Float[Array | np.ndarray, "*#b 3"],
+    second_axis: Float[Array | np.ndarray, "*#b 3"],
 ) -> tuple[Float[Array, "*b"], Float[Array, "*b"]]:
     """The angles (φ, θ) (rad, in (-π, π]) that minimise ‖R - R_a1(φ) R_a2(θ)‖_F, for any two axes.
 
