@@ -1,0 +1,75 @@
+"""Any number of frames through one compiled solver: chunks of a fixed size, the last one padded."""
+
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from mjx_hand.capture.linearise import PoseState
+from mjx_hand.capture.pose_solver import Frames, solve_poses
+from mjx_hand.capture.skinned_points import SkinnedPoints
+
+CHUNK = 512  # frames a call
+Array = np.ndarray
+
+
+def padded(frames: Frames, state: PoseState, size: int) -> tuple[Frames, PoseState]:
+    """Frames and poses with the last frame repeated up to `size`, the repeats without markers."""
+    count = frames.observed.shape[0]
+
+    def pad(array: Array) -> Array:
+        return np.concatenate([array, np.repeat(array[-1:], size - count, axis=0)])
+
+    weight = np.concatenate([frames.weight, np.zeros((size - count, frames.weight.shape[1]), np.float32)])
+    longer = Frames(
+        observed=pad(frames.observed),
+        weight=weight,
+        rest=pad(frames.rest),
+        centres=pad(frames.centres),
+        mean=pad(frames.mean),
+        precision=frames.precision,
+    )
+    return longer, jax.tree.map(pad, state)
+
+
+def part(frames: Frames, state: PoseState, at: slice | Array) -> tuple[Frames, PoseState]:
+    """Some of the frames and their poses."""
+    some = Frames(
+        observed=frames.observed[at],
+        weight=frames.weight[at],
+        rest=frames.rest[at],
+        centres=frames.centres[at],
+        mean=frames.mean[at],
+        precision=frames.precision,
+    )
+    return some, jax.tree.map(lambda array: array[at], state)
+
+
+class Meter:
+    """How much of a known amount of work is done, told to a listener."""
+
+    def __init__(self, listener: Callable[[float], None] | None, total: int) -> None:
+        self._listener, self._total, self._done = listener, total, 0
+
+    def add(self, amount: int) -> None:
+        """Count work as done and tell the listener the share, from 0 to 1."""
+        self._done += amount
+        if self._listener is not None:
+            self._listener(min(self._done / self._total, 1.0))
+
+
+def solve_all(
+    points: SkinnedPoints, frames: Frames, state: PoseState, iterations: int, meter: Meter
+) -> tuple[PoseState, Float[Array, "b m 3"]]:
+    """`solve_poses` on NumPy arrays of any length; a frame counts `iterations` on the meter."""
+    poses, residuals = [], []
+    for start in range(0, frames.observed.shape[0], CHUNK):
+        some, begin = part(frames, state, slice(start, start + CHUNK))
+        count = some.observed.shape[0]
+        solved, residual = solve_poses(points, *jax.tree.map(jnp.asarray, padded(some, begin, CHUNK)), iterations)
+        poses.append(jax.tree.map(lambda array, n=count: np.asarray(array)[:n], solved))
+        residuals.append(np.asarray(residual)[:count])
+        meter.add(count * iterations)
+    return jax.tree.map(lambda *arrays: np.concatenate(arrays), *poses), np.concatenate(residuals)

@@ -1,0 +1,165 @@
+"""Markers to motion: the pose, wrist, shape and skin offsets that explain a marker recording."""
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mjx_hand.capture.batches import Meter, padded, part, solve_all
+from mjx_hand.capture.fit_report import FitReport, make_report
+from mjx_hand.capture.linearise import PoseState
+from mjx_hand.capture.marker_set import MarkerSet, rest_offsets
+from mjx_hand.capture.pose_prior import pose_prior
+from mjx_hand.capture.recording import MarkerRecording
+from mjx_hand.capture.shape_solver import Subject, solve_subject
+from mjx_hand.capture.skinned_points import skinned_points
+from mjx_hand.capture.stages import begin, between_keyframes, drawn_towards, joined, keyframes, smoothed
+from mjx_hand.capture.track import Track, make_track, palm_weights
+from mjx_hand.capture.wrist import fill_poses
+from mjx_hand.errors import InputError
+from mjx_hand.hand.model import HandModel
+from mjx_hand.motion.motion import Motion
+from mjx_hand.motion.resample import matrix_quaternions
+from mjx_hand.pytree import replace
+
+MAX_SHAPE = 10  # coefficients fitted: markers see no more
+KEYFRAMES = 48  # frames from which a recording's shape and skin offsets are taken
+KEYFRAME_STEPS, SUBJECT_STEPS, FRAME_STEPS, SMOOTH_STEPS = 15, 10, 4, 2
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """What the fit believes of the recording.
+
+    Attributes:
+        marker_deviation: standard deviation of a marker coordinate about the model, m: noise and moving skin.
+        offset_deviation: standard deviation of each component of where a marker was stuck on, m.
+        min_visible: markers that a frame must show to be valid.
+        smoothing_time: standard deviation of the Gaussian window over which poses are expected to agree, s.
+        smoothing_deviation: how far (rad) a joint is expected to be from that window's mean.
+        max_residual: RMS distance (m) of a marker from the fitted hand above which the recording is refused.
+    """
+
+    marker_deviation: float = 0.001
+    offset_deviation: float = 0.002
+    min_visible: int = 8
+    smoothing_time: float = 0.03
+    smoothing_deviation: float = 0.05
+    max_residual: float = 0.010
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not (np.isfinite(value) and value > 0):
+                raise InputError(f"fit setting {name} is {value}, expected a number above 0")
+
+
+def fit_markers(
+    recording: MarkerRecording, hand: HandModel, marker_set: MarkerSet, settings: FitSettings | None = None
+) -> tuple[Motion, FitReport]:
+    """The motion of `hand` that explains one recording, and how well it does; see `fit_many`."""
+    return fit_many([recording], hand, marker_set, settings)[0]
+
+
+def fit_many(
+    recordings: Sequence[MarkerRecording],
+    hand: HandModel,
+    marker_set: MarkerSet,
+    settings: FitSettings | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> list[tuple[Motion, FitReport]]:
+    """The motions of `hand` that explain recordings, each of a subject of its own, in one batch.
+
+    Four stages: poses of up to 48 frames a recording on the mean shape; the recording's shape and skin offsets
+    together with these poses; all frames' poses from there; the same again, drawn towards the frames around each.
+
+    Args:
+        recordings: markers with names of the marker set; those of the set that are missing count as hidden.
+        hand: the hand to fit.
+        marker_set: where the markers are, resolved onto this hand.
+        settings: what is believed of the recordings.
+        progress: told the share of the work done, from 0 to 1.
+
+    Returns:
+        For each recording its motion and a report. Frames with too few markers are not valid: their wrist is
+        interpolated and their rotations are the identity.
+
+    Raises:
+        InputError: a recording has unknown markers or nothing to fit, or a marker cannot be explained (two names
+            swapped, or millimetres taken for metres).
+    """
+    settings = settings or FitSettings()
+    points = skinned_points(hand, marker_set.vertices, rest_offsets(marker_set, hand), MAX_SHAPE)
+    prior = pose_prior(hand)
+    palm = palm_weights(np.asarray(hand.weights)[marker_set.vertices, 0])
+    tracks = [make_track(recording, marker_set, settings.min_visible) for recording in recordings]
+    keys = [keyframes(track, KEYFRAMES) for track in tracks]
+    frame_steps = sum(len(track.frames) for track in tracks) * (FRAME_STEPS + SMOOTH_STEPS)
+    meter = Meter(progress, sum(map(len, keys)) * (KEYFRAME_STEPS + SUBJECT_STEPS) + frame_steps)
+
+    mean_subject = Subject(
+        shape=jnp.zeros(points.rest_directions.shape[-1]), offsets=jnp.zeros((len(marker_set.names), 3))
+    )
+    starts = [begin(track, points, mean_subject, palm, prior, settings.marker_deviation) for track in tracks]
+    chosen = [part(frames, state, key) for (frames, state), key in zip(starts, keys, strict=True)]
+    poses, _ = solve_all(points, *joined(chosen), KEYFRAME_STEPS, meter)
+
+    subjects, starts = [], []
+    bounds = np.cumsum([0, *map(len, keys)])
+    for i, (track, key) in enumerate(zip(tracks, keys, strict=True)):
+        pose = jax.tree.map(lambda a, i=i: a[bounds[i] : bounds[i + 1]], poses)
+        some = jax.tree.map(jnp.asarray, padded(chosen[i][0], pose, KEYFRAMES))
+        subject, pose = solve_subject(points, *some, mean_subject, settings.offset_deviation, SUBJECT_STEPS)
+        frames, state = begin(track, points, subject, palm, prior, settings.marker_deviation)
+        vectors = between_keyframes(track.frames, key, np.asarray(pose.vectors)[: len(key)])
+        subjects.append(subject)
+        starts.append((frames, replace(state, vectors=vectors)))
+        meter.add(len(key) * SUBJECT_STEPS)
+
+    frames, state = joined(starts)
+    state, _ = solve_all(points, frames, state, FRAME_STEPS, meter)
+    bounds = np.cumsum([0, *(len(track.frames) for track in tracks)])
+    windows = [slice(a, b) for a, b in itertools.pairwise(bounds)]
+    smooth = [
+        smoothed(state.vectors[at], track.frames, settings.smoothing_time * track.recording.fps)
+        for at, track in zip(windows, tracks, strict=True)
+    ]
+    frames = drawn_towards(frames, np.concatenate(smooth), settings.smoothing_deviation)
+    state, residual = solve_all(points, frames, state, SMOOTH_STEPS, meter)
+
+    out = []
+    for at, track, subject in zip(windows, tracks, subjects, strict=True):
+        motion = make_motion(track, jax.tree.map(lambda a, at=at: a[at], state), subject, hand)
+        offsets = np.asarray(subject.offsets)
+        report = make_report(
+            track, residual[at], offsets, marker_set.names, FRAME_STEPS + SMOOTH_STEPS, settings.max_residual
+        )
+        out.append((motion, report))
+    return out
+
+
+def make_motion(track: Track, state: PoseState, subject: Subject, hand: HandModel) -> Motion:
+    """The motion of a track's fitted frames, with the frames it left out marked as not valid."""
+    count = track.recording.num_frames
+    valid = np.zeros(count, bool)
+    valid[track.frames] = True
+    rotations = np.tile(np.eye(3), (count, 15, 1, 1))
+    vectors = state.vectors.astype(np.float64).reshape(-1, 3)
+    rotations[track.frames] = Rotation.from_rotvec(vectors).as_matrix().reshape(-1, 15, 3, 3)
+    wrist_rotation, wrist_position = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
+    wrist_rotation[track.frames] = Rotation.from_matrix(state.wrist_rotation.astype(np.float64)).as_matrix()
+    wrist_position[track.frames] = state.wrist_position + track.shift
+    wrist_rotation, wrist_position = fill_poses(wrist_rotation, wrist_position, valid)
+    return Motion(
+        fps=track.recording.fps,
+        rotations=rotations,
+        wrist_position=wrist_position,
+        wrist_quaternion=matrix_quaternions(wrist_rotation),
+        shape=np.asarray(subject.shape, np.float64),
+        valid=valid,
+        side=hand.side,
+        source=f"{hand.name} fitted to {track.recording.source or 'a marker recording'}",
+    )

@@ -1,0 +1,164 @@
+"""Where a marker sits, said anatomically, so that one description fits every hand; and its YAML form."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import yaml
+from jaxtyping import Float
+
+from mjx_hand.errors import InputError
+from mjx_hand.hand.joints import FINGERS, LINKS, TIP_LINKS
+from mjx_hand.hand.model import HandModel
+
+TIPS = tuple(f"{finger}_tip" for finger in FINGERS)
+# Directions in the right hand's frame; a left hand is its mirror image in x.
+DIRECTIONS = {
+    "dorsal": (0.0, 1.0, 0.0),
+    "palmar": (0.0, -1.0, 0.0),
+    "radial": (0.0, 0.0, 1.0),
+    "ulnar": (0.0, 0.0, -1.0),
+    "distal": (-1.0, 0.0, 0.0),
+    "proximal": (1.0, 0.0, 0.0),
+}
+KEYS = ("joint", "to", "along", "facing", "offset")
+
+
+@dataclass(frozen=True)
+class MarkerPlace:
+    """A place on the skin: from a point on the bone, straight out in an anatomical direction.
+
+    Attributes:
+        name: the marker's label.
+        joint: the joint (of `hand.joints.LINKS`) at which the bone starts.
+        to: the joint or finger tip (`TIPS`) at which it ends.
+        along: how far from the one to the other, 0 to 1.
+        facing: one or more of `DIRECTIONS`, summed: the way out to the skin.
+        offset: distance (m) of the marker's centre from the skin.
+    """
+
+    name: str
+    joint: str
+    to: str
+    along: float
+    facing: tuple[str, ...]
+    offset: float
+
+
+def next_joint(joint: str) -> str:
+    """The end of the bone that starts at `joint`; for the wrist, the middle finger's knuckle."""
+    if joint == "wrist":
+        return "middle1"
+    link = LINKS.index(joint)
+    return TIPS[TIP_LINKS.index(link)] if link in TIP_LINKS else LINKS[link + 1]
+
+
+def parse_places(text: str, source: str) -> tuple[MarkerPlace, ...]:
+    """Read the YAML form of a marker set.
+
+    A mapping `markers` from each name to its place, and optionally a common `offset`:
+
+        offset: 0.005                 # metres from skin to marker centre, unless the marker says otherwise
+        markers:
+          index_pip: {joint: index2, facing: dorsal}
+          hand_back: {joint: wrist, along: 0.5, facing: dorsal}     # towards middle1, unless `to` says otherwise
+          thumb_nail: {joint: thumb3, along: 0.7, facing: [dorsal, radial]}
+
+    Raises:
+        InputError: the text is not YAML or not of this form.
+    """
+    try:
+        document = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise InputError(f"{source}: not YAML ({' '.join(str(error).split())})") from None
+    if not isinstance(document, Mapping) or not isinstance(document.get("markers"), Mapping) or not document["markers"]:
+        raise InputError(f"{source}: not a marker set; give a mapping `markers` from names to places")
+    unknown = [str(key) for key in document if key not in ("markers", "offset")]
+    if unknown:
+        raise InputError(f"{source}: unknown entry {', '.join(unknown)}; valid are markers, offset")
+    common = document.get("offset")
+    return tuple(parse_place(str(name), entry, common, source) for name, entry in document["markers"].items())
+
+
+def parse_place(name: str, entry: Any, common_offset: Any, source: str) -> MarkerPlace:
+    """One marker's entry, checked."""
+    where = f"{source}: marker {name!r}"
+    if not isinstance(entry, Mapping):
+        raise InputError(f"{where}: {entry!r} is not a place; give for example {{joint: index2, facing: dorsal}}")
+    unknown = [str(key) for key in entry if key not in KEYS]
+    if unknown:
+        raise InputError(f"{where}: unknown entry {', '.join(unknown)}; valid are {', '.join(KEYS)}")
+    joint = choice(where, "joint", entry.get("joint"), LINKS)
+    to = entry.get("to", next_joint(joint))
+    to = choice(where, "to", to, (*LINKS, *TIPS))
+    facing = entry.get("facing")
+    words = facing if isinstance(facing, list) and facing else [facing]
+    directions = tuple(choice(where, "facing", word, tuple(DIRECTIONS)) for word in words)
+    if not np.any(np.sum([DIRECTIONS[word] for word in directions], axis=0)):
+        raise InputError(f"{where}: facing {', '.join(directions)} cancels out; give directions that differ")
+    along = number(where, "along", entry.get("along", 0.0), 1.0)
+    offset = number(where, "offset", entry.get("offset", common_offset), 0.05)
+    return MarkerPlace(name=name, joint=joint, to=to, along=along, facing=directions, offset=offset)
+
+
+def choice(where: str, key: str, value: Any, valid: tuple[str, ...]) -> str:
+    """`value` if it is one of the valid words."""
+    if value not in valid:
+        raise InputError(f"{where}: {key} is {value!r}; valid are {', '.join(valid)}")
+    return value
+
+
+def number(where: str, key: str, value: Any, most: float) -> float:
+    """`value` if it is a number from 0 to `most`."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= most:
+        raise InputError(f"{where}: {key} is {value!r}, expected a number from 0 to {most:g}")
+    return float(value)
+
+
+def skin_vertex(place: MarkerPlace, hand: HandModel) -> int:
+    """The vertex nearest to where the ray from the bone, in the direction that the place faces, leaves the skin.
+
+    Raises:
+        InputError: the ray meets no skin.
+    """
+    template = np.asarray(hand.template, np.float64)
+    centres = np.asarray(hand.joint_regressor, np.float64) @ template
+    tips = template[np.asarray(hand.tip_vertices)]
+    ends = {**dict(zip(LINKS, centres, strict=True)), **dict(zip(TIPS, tips, strict=True))}
+    start, end = ends[place.joint], ends[place.to]
+    direction = np.sum([DIRECTIONS[word] for word in place.facing], axis=0)
+    if hand.side == "left":
+        direction = direction * [-1.0, 1.0, 1.0]
+    if place.joint != "wrist":  # at right angles to a phalanx, however it slopes
+        bone = (end - start) / np.linalg.norm(end - start)
+        direction = direction - (direction @ bone) * bone
+    origin = start + place.along * (end - start)
+    hit = first_hit(origin, direction / np.linalg.norm(direction), template[hand.faces])
+    if hit is None:
+        raise InputError(
+            f"marker {place.name!r}: its place does not meet the skin of {hand.name}; check joint and facing"
+        )
+    face, point = hit
+    corners = np.asarray(hand.faces)[face]
+    return int(corners[np.argmin(np.linalg.norm(template[corners] - point, axis=1))])
+
+
+def first_hit(
+    origin: Float[np.ndarray, "3"], direction: Float[np.ndarray, "3"], triangles: Float[np.ndarray, "f 3 3"]
+) -> tuple[int, Float[np.ndarray, "3"]] | None:
+    """The first triangle that a ray crosses and the point where (Möller and Trumbore 1997); None if none."""
+    edge1, edge2 = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    p = np.cross(direction, edge2)
+    determinant = np.einsum("fc,fc->f", edge1, p)
+    inverse = 1 / np.where(np.abs(determinant) > 1e-15, determinant, np.inf)
+    to_origin = origin - triangles[:, 0]
+    u = np.einsum("fc,fc->f", to_origin, p) * inverse
+    q = np.cross(to_origin, edge1)
+    v = (q @ direction) * inverse
+    distance = np.einsum("fc,fc->f", edge2, q) * inverse
+    inside = (inverse != 0) & (u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 0)
+    if not inside.any():
+        return None
+    face = int(np.argmin(np.where(inside, distance, np.inf)))
+    return face, origin + distance[face] * direction

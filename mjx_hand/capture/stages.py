@@ -1,0 +1,98 @@
+"""What lies between the solver's passes over a recording: first guesses, key frames, smoothing."""
+
+import jax
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.ndimage import gaussian_filter1d
+
+from mjx_hand.capture.linearise import PoseState
+from mjx_hand.capture.pose_prior import PosePrior
+from mjx_hand.capture.pose_solver import Frames
+from mjx_hand.capture.shape_solver import Subject, subject_points
+from mjx_hand.capture.skinned_points import SkinnedPoints
+from mjx_hand.capture.track import Track, wrist_guess
+from mjx_hand.motion.resample import interpolation_index
+from mjx_hand.pytree import replace
+
+Array = np.ndarray
+
+
+def begin(
+    track: Track,
+    points: SkinnedPoints,
+    subject: Subject,
+    palm: Float[Array, "m"],
+    prior: PosePrior,
+    marker_deviation: float,
+) -> tuple[Frames, PoseState]:
+    """A track's frames for the solver, and a first guess: fingers at the prior's mean, the wrist from the palm."""
+    rest, centres = (np.asarray(array) for array in subject_points(points, subject))
+    rotation, position = wrist_guess(track, (rest - centres[0]).astype(np.float64), palm)
+    count = len(track.frames)
+    mean = np.broadcast_to(np.asarray(prior.mean), (count, 15, 3))
+    frames = Frames(
+        observed=track.observed.astype(np.float32),
+        weight=(track.visible / marker_deviation**2).astype(np.float32),
+        rest=np.broadcast_to(rest, (count, *rest.shape)),
+        centres=np.broadcast_to(centres, (count, *centres.shape)),
+        mean=mean,
+        precision=np.asarray(prior.precision),
+    )
+    state = PoseState(
+        vectors=mean,
+        wrist_rotation=rotation.astype(np.float32),
+        wrist_position=position.astype(np.float32),
+    )
+    return frames, state
+
+
+def keyframes(track: Track, count: int) -> Int[Array, "k"]:
+    """Up to `count` of a track's frames, evenly spread over it."""
+    return np.unique(np.linspace(0, len(track.frames) - 1, count).round().astype(int))
+
+
+def between_keyframes(
+    frames: Int[Array, "b"], key: Int[Array, "k"], vectors: Float[Array, "k 15 3"]
+) -> Float[Array, "b 15 3"]:
+    """Rotation vectors of all frames, interpolated between the key frames'."""
+    before, after, fraction = interpolation_index(frames[key].astype(float), frames.astype(float))
+    step = fraction[:, None, None].astype(np.float32)
+    return (1 - step) * vectors[before] + step * vectors[after]
+
+
+def smoothed(vectors: Float[Array, "b 15 3"], frames: Int[Array, "b"], deviation: float) -> Float[Array, "b 15 3"]:
+    """Rotation vectors averaged over a Gaussian window of `deviation` frames; missing frames count for nothing."""
+    span = np.zeros((frames[-1] - frames[0] + 1, 1, 1))
+    span[frames - frames[0]] = 1.0
+    values = np.zeros((len(span), *vectors.shape[1:]))
+    values[frames - frames[0]] = vectors
+    blur = gaussian_filter1d(values, deviation, axis=0, mode="constant")
+    mass = gaussian_filter1d(span, deviation, axis=0, mode="constant")
+    return (blur[frames - frames[0]] / mass[frames - frames[0]]).astype(np.float32)
+
+
+def drawn_towards(frames: Frames, vectors: Float[Array, "b 15 3"], deviation: float) -> Frames:
+    """The frames with a prior that is the present one times a normal one about `vectors` (rad)."""
+    pull = np.eye(3) / deviation**2
+    precision = frames.precision + pull
+    weighted = np.einsum("jac,bjc->bja", frames.precision, frames.mean) + vectors / deviation**2
+    mean = np.einsum("jac,bjc->bja", np.linalg.inv(precision), weighted)
+    return replace(frames, mean=mean.astype(np.float32), precision=precision.astype(np.float32))
+
+
+def joined(pieces: list[tuple[Frames, PoseState]]) -> tuple[Frames, PoseState]:
+    """The frames and poses of several tracks in one row."""
+    frames = [piece[0] for piece in pieces]
+
+    def row(name: str) -> Array:
+        return np.concatenate([getattr(f, name) for f in frames])
+
+    together = Frames(
+        observed=row("observed"),
+        weight=row("weight"),
+        rest=row("rest"),
+        centres=row("centres"),
+        mean=row("mean"),
+        precision=frames[0].precision,
+    )
+    return together, jax.tree.map(lambda *arrays: np.concatenate(arrays), *[piece[1] for piece in pieces])

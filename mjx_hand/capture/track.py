@@ -1,0 +1,95 @@
+"""A recording made ready to fit: its usable frames, in the marker set's order, near the origin."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from mjx_hand.capture.marker_set import MarkerSet
+from mjx_hand.capture.recording import MarkerRecording, check_recording
+from mjx_hand.capture.wrist import fill_poses, rigid_fit
+from mjx_hand.errors import InputError
+
+PALM = 0.25  # least weight of the wrist's link at a marker that tells where the wrist is
+MIN_PALM = 3
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Track:
+    """The frames of one recording that show enough of the hand.
+
+    Attributes:
+        recording: where they come from.
+        frames: their numbers in the recording.
+        observed: marker positions in the marker set's order (m), less `shift`.
+        visible: which were seen.
+        shift: mean of each frame's visible markers (m, the recording's frame): single precision then suffices
+            wherever the capture system's origin is.
+    """
+
+    recording: MarkerRecording
+    frames: Int[Array, "b"]
+    observed: Float[Array, "b m 3"]
+    visible: Bool[Array, "b m"]
+    shift: Float[Array, "b 3"]
+
+
+def make_track(recording: MarkerRecording, marker_set: MarkerSet, min_visible: int) -> Track:
+    """The usable frames: those with at least `min_visible` of the set's markers.
+
+    Raises:
+        InputError: a marker's name is not in the set, or no frame is usable.
+    """
+    check_recording(recording)
+    name = recording.source or "recording"
+    unknown = [n for n in recording.names if n not in marker_set.names]
+    if unknown:
+        raise InputError(
+            f"{name}: unknown marker {', '.join(map(repr, unknown))}; the marker set has "
+            f"{', '.join(marker_set.names)}; rename it, or leave it out with select_markers"
+        )
+    at = [marker_set.names.index(n) for n in recording.names]
+    observed = np.zeros((recording.num_frames, len(marker_set.names), 3))
+    visible = np.zeros(observed.shape[:2], bool)
+    observed[:, at], visible[:, at] = recording.positions, recording.visible
+    frames = np.flatnonzero(visible.sum(axis=1) >= min_visible)
+    if frames.size == 0:
+        raise InputError(f"{name}: no frame shows {min_visible} markers of the set; nothing to fit")
+    observed, visible = observed[frames], visible[frames]
+    shift = np.einsum("bm,bmc->bc", visible, observed) / visible.sum(axis=1)[:, None]
+    observed = np.where(visible[..., None], observed - shift[:, None], 0.0)
+    return Track(recording=recording, frames=frames, observed=observed, visible=visible, shift=shift)
+
+
+def palm_weights(wrist_weight: Float[Array, "m"]) -> Float[Array, "m"]:
+    """How much each marker says about the wrist, from the wrist's skinning weight at it.
+
+    Raises:
+        InputError: fewer than three markers are on the palm.
+    """
+    weights = np.where(wrist_weight >= PALM, wrist_weight**2, 0.0)
+    if (weights > 0).sum() < MIN_PALM:
+        raise InputError(
+            f"the marker set has {(weights > 0).sum()} markers on the wrist and palm; at least {MIN_PALM} are needed"
+        )
+    return weights
+
+
+def wrist_guess(
+    track: Track, rest: Float[Array, "m 3"], palm: Float[Array, "m"]
+) -> tuple[Float[Array, "b 3 3"], Float[Array, "b 3"]]:
+    """Wrist rotation and position (m, less `shift`) from the palm's markers at rest relative to the wrist joint.
+
+    Raises:
+        InputError: no frame's markers determine it.
+    """
+    rotation, position, known = rigid_fit(rest, track.observed, palm * track.visible)
+    if not known.any():
+        name = track.recording.source or "recording"
+        raise InputError(
+            f"{name}: no frame shows {MIN_PALM} markers of the palm that are not on a line; nothing to fit"
+        )
+    rotation, position = fill_poses(rotation, position + track.shift, known)
+    return rotation, position - track.shift
