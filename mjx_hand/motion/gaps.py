@@ -1,7 +1,7 @@
 """Filling gaps: what a motion holds in frames that were not recorded, from the frames around them."""
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from mjx_hand.motion.resample import interpolation_index, matrix_quaternions, quaternion_matrices, slerp
 
@@ -13,7 +13,7 @@ def fill_lines(values: Float[Array, "t *d"], valid: Bool[Array, "t"]) -> Float[A
     before, after, fraction = _neighbours(valid)
     step = fraction.reshape(-1, *(1,) * (values.ndim - 1))
     known = values[valid]
-    return known[before] + step * (known[after] - known[before])
+    return (1 - step) * known[before] + step * known[after]  # exact at both ends
 
 
 def fill_turns(quaternions: Float[Array, "t 4"], valid: Bool[Array, "t"]) -> Float[Array, "t 4"]:
@@ -23,6 +23,6 @@ def fill_turns(quaternions: Float[Array, "t 4"], valid: Bool[Array, "t"]) -> Flo
     return matrix_quaternions(slerp(known[before], known[after], fraction))
 
 
-def _neighbours(valid: Bool[Array, "t"]) -> tuple[Array, Array, Float[Array, "t"]]:
+def _neighbours(valid: Bool[Array, "t"]) -> tuple[Int[Array, "t"], Int[Array, "t"], Float[Array, "t"]]:
     """Of each frame: the valid frames before and after it, counted among the valid ones, and the fraction between."""
     return interpolation_index(np.flatnonzero(valid).astype(float), np.arange(len(valid), dtype=float))

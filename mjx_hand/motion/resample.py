@@ -1,7 +1,7 @@
 """A motion at another frame rate: great arcs between rotations, straight lines between positions."""
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.spatial.transform import Rotation
 
 from mjx_hand.errors import InputError
@@ -13,7 +13,7 @@ Array = np.ndarray
 
 def interpolation_index(
     times: Float[Array, "n"], query: Float[Array, "q"]
-) -> tuple[Float[Array, "q"], Float[Array, "q"], Float[Array, "q"]]:
+) -> tuple[Int[Array, "q"], Int[Array, "q"], Float[Array, "q"]]:
     """For each query time the samples before and after it and the fraction between; held beyond the ends."""
     after = np.clip(np.searchsorted(times, query, side="right"), 1, max(len(times) - 1, 1))
     after = np.minimum(after, len(times) - 1)

@@ -1,0 +1,45 @@
+"""`mjx-hand build`: a personalised hand as URDF and MJCF."""
+
+from pathlib import Path
+from typing import Literal
+
+from mjx_hand.cli.output import print_table
+from mjx_hand.hand.joints import HINGES, LINKS
+from mjx_hand.hand.load import load_hand
+from mjx_hand.rigid.build import build_rigid_hand
+from mjx_hand.rigid.mesh_folder import filling
+from mjx_hand.rigid.mjcf import write_mjcf
+from mjx_hand.rigid.urdf import write_urdf
+
+
+def build(
+    out: Path,
+    shape: tuple[float, ...] = (),
+    side: Literal["right", "left"] = "right",
+    mano: Path | None = None,
+    wrist_joints: bool = False,
+) -> None:
+    """Write a hand of a given shape as URDF and MJCF, with meshes, masses, limits and collision shapes.
+
+    Args:
+        out: folder to write to; made if absent.
+        shape: shape coefficients, unit variance each; none is the mean hand.
+        side: which hand.
+        mano: a licensed MANO file (MANO_RIGHT.pkl, MANO_LEFT.pkl or .npz); without it, the open hand.
+        wrist_joints: put six movable joints between the world and the wrist.
+    """
+    rigid = build_rigid_hand(load_hand(mano, side), shape or None)
+    with filling(out) as folder:  # both files or none
+        names = [
+            write_urdf(rigid, folder, wrist_joints=wrist_joints).name,
+            write_mjcf(rigid, folder, base="actuated" if wrist_joints else "fixed").name,
+        ]
+    rows = [
+        (link, f"{mass * 1e3:.1f}", str(len(faces)), str(rigid.capsule_links.count(k)))
+        for k, (link, mass, faces) in enumerate(zip(LINKS, rigid.link_mass, rigid.mesh_faces, strict=True))
+    ]
+    title = f"{rigid.name}, {rigid.side}: {len(LINKS)} links, {len(HINGES)} hinges, {rigid.link_mass.sum() * 1e3:.0f} g"
+    print_table(title, ("link", "mass (g)", "triangles", "capsules"), rows)
+    urdf, mjcf = (out / name for name in names)
+    print(f"{urdf}  for PyBullet, Isaac, Drake, ROS: yourdfpy.URDF.load({str(urdf)!r})")
+    print(f"{mjcf}  for MuJoCo and MJX: mujoco.MjModel.from_xml_path({str(mjcf)!r})")

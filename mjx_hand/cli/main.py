@@ -1,0 +1,31 @@
+"""The command `mjx-hand`: one file a subcommand beside this one."""
+
+import sys
+from collections.abc import Sequence
+
+import tyro
+
+from mjx_hand.cli.build import build
+from mjx_hand.cli.retarget import retarget
+from mjx_hand.compile_cache import enable_compile_cache
+from mjx_hand.errors import InputError
+
+COMMANDS = {"build": build, "retarget": retarget}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a subcommand; returns the exit status: 0, or 2 for input that cannot be used (one line on standard error).
+
+    Args:
+        argv: the arguments; the process's own if None.
+
+    Raises:
+        SystemExit: by tyro, after `--help` (0) and for unknown or missing options (2).
+    """
+    try:
+        enable_compile_cache()
+        tyro.extras.subcommand_cli_from_dict(COMMANDS, prog="mjx-hand", args=argv)
+    except InputError as error:
+        print(f"mjx-hand: {error}", file=sys.stderr)
+        return 2
+    return 0
