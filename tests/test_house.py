@@ -1,0 +1,96 @@
+"""The house's rules that no linter knows: which way imports run, and that modules stay small."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+TOPS = ("mjx_hand", "envs", "train")
+MODULES = sorted(p for top in TOPS for p in (ROOT / top).rglob("*.py"))
+MAX_LINES = 300
+
+# From the top floor down. A module stands on the floor of its longest name here, and imports from lower floors or
+# its own room; rooms that share a floor do not know each other.
+FLOORS = (
+    ("train",),
+    ("envs",),
+    ("mjx_hand.cli",),
+    ("mjx_hand.view",),
+    ("mjx_hand.retarget",),
+    ("mjx_hand.capture", "mjx_hand.projection"),
+    ("mjx_hand.rigid",),
+    ("mjx_hand.hand",),
+    ("mjx_hand.motion",),
+    ("mjx_hand.hand.joints",),  # the order of all arrays
+    ("mjx_hand.rotations", "mjx_hand.pytree", "mjx_hand.compile_cache"),
+    ("mjx_hand.errors",),
+)
+FRONT_DOOR = "mjx_hand"  # re-exports the public names, so it opens on every room and no module goes through it
+
+
+def module_name(path: Path) -> str:
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def is_module(name: str) -> bool:
+    path = ROOT / Path(*name.split("."))
+    return path.is_dir() or path.with_suffix(".py").is_file()
+
+
+def imports(path: Path) -> Iterator[str]:
+    """Full names of this project's modules that a module imports, wherever in it."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name.split(".")[0] in TOPS)
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] in TOPS:
+            modules = [f"{node.module}.{alias.name}" for alias in node.names]
+            yield from (name if is_module(name) else node.module for name in modules)
+
+
+def place(name: str) -> tuple[int, str]:
+    """The floor, counted from the top, and the room of a module."""
+    rooms = [
+        (len(room), k, room) for k, floor in enumerate(FLOORS) for room in floor if f"{name}.".startswith(f"{room}.")
+    ]
+    assert rooms, f"{name} has no place in FLOORS"
+    _, floor, room = max(rooms)
+    return floor, room
+
+
+def test_imports_run_downwards():
+    wrong = []
+    for path in MODULES:
+        name = module_name(path)
+        if name == FRONT_DOOR:
+            continue
+        floor, room = place(name)
+        for imported in set(imports(path)):
+            if imported == FRONT_DOOR:
+                wrong.append(f"{name} imports {FRONT_DOOR}, which imports everything: name the module")
+                continue
+            to_floor, to_room = place(imported)
+            if not (to_floor > floor or to_room == room):
+                wrong.append(f"{name} imports {imported}, which does not stand below it")
+    assert not wrong, "\n".join(sorted(wrong))
+
+
+def test_modules_stay_small():
+    lines = {module_name(path): len(path.read_text().splitlines()) for path in MODULES}
+    long = {name: count for name, count in lines.items() if count > MAX_LINES}
+    assert not long, f"over {MAX_LINES} lines, split at the seam: {long}"
+
+
+def test_no_import_is_relative():
+    relative = [
+        module_name(path)
+        for path in MODULES
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.ImportFrom) and node.level
+    ]
+    assert not relative, f"write full names: {relative}"
+
+
+def test_a_name_is_read_as_its_own_room_and_not_as_one_that_begins_alike():
+    assert place("mjx_hand.hand.joints")[0] > place("mjx_hand.motion.motion")[0] > place("mjx_hand.hand.model")[0]
+    assert place("mjx_hand.rigid.rigid_hand")[1] == "mjx_hand.rigid"
