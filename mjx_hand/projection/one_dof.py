@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from mjx_hand.projection.products import dot, turn
+from mjx_hand.projection.products import dot, trace, turn
 from mjx_hand.rotations import vee
 
 
@@ -24,13 +24,13 @@ def project_one_dof(
     """
     rotation, axis = jnp.asarray(rotation), jnp.asarray(axis)
     sine = 2 * dot(vee(rotation), axis)
-    cosine = jnp.trace(rotation, axis1=-2, axis2=-1) - dot(axis, turn(rotation, axis))
+    cosine = trace(rotation) - dot(axis, turn(rotation, axis))
     return direction_angle(sine, cosine)
 
 
 def direction_angle(sine: Float[Array, "*#b"], cosine: Float[Array, "*#b"]) -> Float[Array, "*b"]:
     """atan2 in (-π, π]; where both arguments vanish to rounding, the angle is 0 and so is its gradient."""
-    vanishes = jnp.hypot(sine, cosine) < 8 * jnp.finfo(sine.dtype).eps
+    vanishes = sine**2 + cosine**2 < (8 * jnp.finfo(sine.dtype).eps) ** 2
     # atan2 sees (0, 1) there, so that its gradient's division by zero cannot reach the caller as NaN.
     angle = jnp.arctan2(jnp.where(vanishes, 0.0, sine), jnp.where(vanishes, 1.0, cosine))
     return jnp.where(angle <= -jnp.pi, angle + 2 * jnp.pi, angle)  # atan2(-0, -1) is -π

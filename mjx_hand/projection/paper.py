@@ -6,7 +6,7 @@ from jaxtyping import Array, Float
 
 from mjx_hand.projection.naive import naive_two_dof
 from mjx_hand.projection.one_dof import direction_angle
-from mjx_hand.projection.products import dot
+from mjx_hand.projection.products import dot, trace
 from mjx_hand.rotations import log, vee
 
 ITERATIONS = 3  # the paper's
@@ -19,7 +19,7 @@ def paper_one_dof(
     """θ = atan2(a·vee(R), (tr R - 1) / 2) (rad), given as the minimiser of ‖R - R_a(θ)‖_F, which it is not."""
     rotation = jnp.asarray(rotation)
     sine = dot(vee(rotation), jnp.asarray(axis))
-    return direction_angle(sine, (jnp.trace(rotation, axis1=-2, axis2=-1) - 1) / 2)
+    return direction_angle(sine, (trace(rotation) - 1) / 2)
 
 
 def paper_two_dof(

