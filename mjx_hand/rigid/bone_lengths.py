@@ -1,7 +1,7 @@
 """A rigid hand with a person's own joint centres."""
 
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array
 
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_LINKS, PARENTS, TIP_LINKS
@@ -10,9 +10,7 @@ from mjx_hand.rigid.axes import AXES
 from mjx_hand.rigid.rigid_hand import RigidHand
 
 
-def with_link_offsets(
-    rigid: RigidHand, link_offset: Float[np.ndarray | Array, "16 3"], axes: str = "anatomical"
-) -> RigidHand:
+def with_link_offsets(rigid: RigidHand, link_offset: np.ndarray | Array, axes: str = "anatomical") -> RigidHand:
     """`rigid` with these joint centres and the hinge axes that follow from them; for kinematics.
 
     Finger tips move out or in by as much as the last recorded bone of their finger is longer or shorter. Masses, meshes
@@ -20,7 +18,8 @@ def with_link_offsets(
 
     Args:
         rigid: the hand to take all else from.
-        link_offset: each joint's centre relative to its parent's (m), in hand-frame directions at rest; row 0 is zero.
+        link_offset: (16, 3), each joint's centre relative to its parent's (m), in hand-frame directions at rest;
+            row 0 is zero.
         axes: how the hinge axes are found, a name in `axes.AXES`.
 
     Raises:

@@ -37,12 +37,15 @@ def phalanx_capsules(
         distal = link in TIP_LINKS
         far = tips[TIP_LINKS.index(link)] if distal else centres[PARENTS.index(link)]
         segment = np.stack([centres[link], far])
-        across = np.linalg.norm(np.cross(points[link] - segment[0], _unit(segment[1] - segment[0])), axis=1)
-        radius = float(np.median(across))
+        bone = _unit(segment[1] - segment[0])
+        # Fit the shaft alone: a link's skin reaches behind its joint, into the web, where it is no tube.
+        along = (points[link] - segment[0]) @ bone
+        shaft = (along > 0) & (distal | (along < np.linalg.norm(segment[1] - segment[0])))
+        skin, area = points[link][shaft], areas[link][shaft]
+        radius = float(np.median(np.linalg.norm(np.cross(skin - segment[0], bone), axis=1)))
         if distal:
-            segment[1] -= radius * _unit(segment[1] - segment[0])
-        free = np.array([False, distal])  # which ends may slide along the bone
-        segment, radius = _fit(points[link], areas[link], segment, radius, free)
+            segment[1] -= radius * bone
+        segment, radius = _fit(skin, area, segment, radius, slides=np.array([False, distal]))
         ends.append(segment)
         radii.append(radius)
     return np.stack(ends), np.array(radii)
@@ -51,27 +54,32 @@ def phalanx_capsules(
 def palm_capsules(
     points: Float[np.ndarray, "p 3"], areas: Float[np.ndarray, "p"], centres: Float[np.ndarray, "16 3"]
 ) -> Capsules:
-    """Capsules of the palm, in the hand frame: four metacarpals, the web of the thumb, and the carpus.
+    """Capsules of the palm, in the hand frame: four metacarpals and the carpus, across the wrist.
 
-    Each is fitted to the skin that is nearest to it.
+    Each is fitted to the skin that is nearest to it. The ball of the thumb is the thumb's own first link, and the fold
+    of skin between thumb and index has none: it gives way in a real hand.
     """
     joint = dict(zip(LINKS, centres, strict=True))
     wrist = joint["wrist"]
     knuckles = [joint[f"{finger}1"] for finger in ("index", "middle", "ring", "pinky")]
     # Metacarpals fan out from the carpus, whose width is about two thirds of the knuckles'.
     middle = np.mean(knuckles, axis=0)
-    bases = [wrist + 0.25 * (middle - wrist) + 0.6 * (knuckle - middle) for knuckle in knuckles]
-    web = (joint["thumb1"], 0.5 * (joint["thumb2"] + joint["index1"]))
-    carpus = (bases[0] + 0.3 * (wrist - middle), bases[3] + 0.3 * (wrist - middle))
-    ends = np.array([*zip(bases, knuckles, strict=True), web, carpus])
-    radii = np.full(len(ends), 0.15 * np.linalg.norm(middle - wrist))
-    free = np.array([True, False])
+    hand = middle - wrist
+    bases = [wrist + 0.25 * hand + 0.6 * (knuckle - middle) for knuckle in knuckles]
+    carpus = (0.5 * (wrist + bases[0]), 0.5 * (wrist + bases[3]))
+    ends = np.array([*zip(bases, knuckles, strict=True), carpus])
+    radii = np.full(len(ends), 0.15 * np.linalg.norm(hand))
+    # The mesh runs on into the forearm, and the thumb's web stands off the palm: neither is fitted.
+    along = (points - wrist) @ hand / (hand @ hand)
+    kept = (along > -0.1) & (surface_distance(points, ends, radii) < radii[0])
+    points, areas = points[kept], areas[kept]
+    slides = np.array([True, False])
     for _ in range(3):
         nearest = (segment_distance(points, ends) - radii).argmin(axis=1)
         for k in range(len(ends)):
             mine = nearest == k
             if mine.sum() >= 12:
-                ends[k], radii[k] = _fit(points[mine], areas[mine], ends[k], radii[k], free)
+                ends[k], radii[k] = _fit(points[mine], areas[mine], ends[k], radii[k], slides)
     return ends, radii
 
 

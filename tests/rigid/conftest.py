@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mjx_hand.hand.load import load_hand
 
+from mjx_hand.hand.load import load_hand
 from mjx_hand.hand.model import HandModel
 from mjx_hand.rigid.build import build_rigid_hand
 from mjx_hand.rigid.mjcf import write_mjcf

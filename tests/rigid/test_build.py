@@ -3,9 +3,9 @@ import time
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from mjx_hand.hand.load import load_hand
 
 from mjx_hand.errors import InputError
+from mjx_hand.hand.load import load_hand
 from mjx_hand.hand.skinning import joint_centres, shaped_template
 from mjx_hand.rigid.build import build_rigid_hand
 from mjx_hand.rigid.rigid_hand import finger_tips, forward_kinematics

@@ -35,7 +35,9 @@ def test_rigid_chain_is_the_skinned_hands_chain(rigid, angles, poses):
     for link, parent in enumerate((-1, 0, 1, 2, 0, 4, 5, 0, 7, 8, 0, 10, 11, 0, 13, 14)):
         if link:
             centres[link] = centres[parent] + rigid.link_offset[link]
-    rotations, positions = link_transforms(joint_rotations(angles, rigid), jnp.asarray(centres))
+    rotations, positions = link_transforms(
+        joint_rotations(angles, rigid), jnp.broadcast_to(jnp.asarray(centres), (len(angles), 16, 3))
+    )
     np.testing.assert_allclose(rotations, poses[0], atol=1e-6)
     np.testing.assert_allclose(positions, poses[1], atol=1e-6)
 
@@ -47,7 +49,7 @@ def mujoco_poses(model, angles, wrist="wrist"):
     for row in angles:
         data.qpos[address] = row
         mujoco.mj_kinematics(model, data)
-        rotations.append([data.body(name).xmat.reshape(3, 3) for name in LINKS])
+        rotations.append([data.body(name).xmat.reshape(3, 3).copy() for name in LINKS])
         positions.append([data.body(name).xpos - data.body(wrist).xpos for name in LINKS])
     return np.array(rotations), np.array(positions)
 

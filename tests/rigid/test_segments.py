@@ -1,12 +1,13 @@
 import numpy as np
 import pytest
 import trimesh
-from mjx_hand.hand.load import load_hand
 
 from mjx_hand.errors import InputError
+from mjx_hand.hand.load import load_hand
 from mjx_hand.pytree import replace
 from mjx_hand.rigid.build import build_rigid_hand
-from mjx_hand.rigid.segments import DENSITY, border_loops, close, face_links
+from mjx_hand.rigid.segments import DENSITY, border_loops, cap_outlines, close, cut, face_links
+from tests.rigid.conftest import SHAPE
 
 
 @pytest.fixture(scope="module")
@@ -32,12 +33,18 @@ def test_segments_of_random_shapes_are_closed_and_sound(open_hand, seed):
 
 def test_masses_sum_to_the_whole_hand(hand, rigid):
     whole = close(np.asarray(hand.faces))
-    from tests.rigid.conftest import SHAPE
-
     rest = hand.template + hand.shapedirs[..., : len(SHAPE)] @ SHAPE
     volume = trimesh.Trimesh(whole.vertices(rest), whole.faces, process=False).volume
     np.testing.assert_allclose(rigid.link_mass.sum(), DENSITY * volume, rtol=1e-5)
     assert 0.2 < rigid.link_mass.sum() < 0.7  # a human hand weighs about 0.4 kg
+
+
+def test_segments_fill_the_hand_without_gap_or_overlap(open_hand):
+    rest = open_hand.template.astype(float)
+    whole = trimesh.Trimesh(rest, open_hand.faces, process=False)
+    assert whole.is_watertight
+    parts = [trimesh.Trimesh(piece.vertices(rest), piece.faces, process=False) for piece in cut(open_hand)]
+    np.testing.assert_allclose(sum(part.volume for part in parts), whole.volume, rtol=1e-9)
 
 
 def test_inertia_agrees_with_a_sampled_solid(rigid):
@@ -87,3 +94,14 @@ def test_border_loops_split_where_they_touch():
     # Two triangles that share only vertex 0: one boundary that passes it twice.
     loops = border_loops(np.array([[0, 1, 2], [0, 3, 4]]))
     assert sorted(sorted(loop.tolist()) for loop in loops) == [[0, 1, 2], [0, 3, 4]]
+
+
+def test_outlines_pair_up_across_a_finger_base():
+    # A loop that borders segment 7 on the back and on the palm of the hand, with 8 and 9 to either side.
+    outlines = cap_outlines(list(range(8)), [7, 7, 8, 8, 7, 7, 9, 9], set())
+    assert sorted(sorted(outline.tolist()) for outline in outlines) == [[0, 1, 2, 4, 5, 6], [0, 6, 7], [2, 3, 4]]
+
+
+def test_a_chord_that_would_double_a_skin_edge_is_not_drawn():
+    outlines = cap_outlines(list(range(4)), [7, 7, 8, 8], {(0, 2)})
+    assert [sorted(outline.tolist()) for outline in outlines] == [[0, 1, 2, 3]]
