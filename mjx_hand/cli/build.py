@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from mjx_hand.cli.output import print_table
 from mjx_hand.hand.joints import HINGES, LINKS
 from mjx_hand.hand.load import load_hand
@@ -28,7 +30,7 @@ def build(
         mano: a licensed MANO file (MANO_RIGHT.pkl, MANO_LEFT.pkl or .npz); without it, the open hand.
         wrist_joints: put six movable joints between the world and the wrist.
     """
-    rigid = build_rigid_hand(load_hand(mano, side), shape or None)
+    rigid = build_rigid_hand(load_hand(mano, side), np.array(shape))
     with filling(out) as folder:  # both files or none
         names = [
             write_urdf(rigid, folder, wrist_joints=wrist_joints).name,

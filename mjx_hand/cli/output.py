@@ -7,8 +7,9 @@ from rich.text import Text
 
 
 def print_table(title: str, columns: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
-    """A table on standard output; the first column's entries are left-aligned, numbers right."""
-    table = Table(title=title, title_justify="left")
+    """A line and a table on standard output; the first column's entries are left-aligned, numbers right."""
+    print(title)  # not the table's own title, which would be broken at the table's width
+    table = Table()
     for k, column in enumerate(columns):
         table.add_column(column, justify="left" if k == 0 else "right")
     for row in rows:

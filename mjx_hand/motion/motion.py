@@ -54,13 +54,17 @@ class Motion:
         return self.rotations.shape[0]
 
 
-def check_motion(motion: Motion) -> Motion:
+def check_motion(motion: Motion, name: str = "") -> Motion:
     """Return `motion` if it is well formed.
+
+    Args:
+        motion: what to check.
+        name: what messages call it, such as its file; its source if empty.
 
     Raises:
         InputError: it is empty, or shapes, rotations, quaternions, bones, fps or side are not valid.
     """
-    name = motion.source or "motion"
+    name = name or motion.source or "motion"
     frames = motion.rotations.shape[0]
     if frames == 0:
         raise InputError(f"{name}: the recording has no frames")
@@ -143,5 +147,6 @@ def load_motion_file(path: str | Path) -> Motion:
             link_offset=offset,
             side=text(path, a, "side"),
             source=text(path, a, "source"),
-        )
+        ),
+        name=str(path),
     )

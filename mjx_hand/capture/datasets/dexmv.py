@@ -86,7 +86,8 @@ def _read(path: Path, arrays: Arrays) -> Motion:
             link_offset=np.median(link_offsets_by_frame(seen), axis=0),
             side="right",
             source=f"DexMV {path.name}",
-        )
+        ),
+        name=str(path),
     )
 
 

@@ -1,0 +1,71 @@
+"""`mjx-hand build`, called as a shell would, its files loaded by programs of others."""
+
+import mujoco
+import numpy as np
+import pytest
+import yourdfpy
+
+from mjx_hand.cli.main import main
+from mjx_hand.hand.joints import HINGES
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("build") / "hand"
+    assert main(["build", "--out", str(folder), "--shape", "1.5", "-0.5"]) == 0
+    return folder
+
+
+def test_both_descriptions_load_and_agree(built):
+    urdf = yourdfpy.URDF.load(str(built / "right_hand.urdf"))
+    mjcf = mujoco.MjModel.from_xml_path(str(built / "right_hand.xml"))
+    assert tuple(urdf.actuated_joint_names) == HINGES
+    assert tuple(mjcf.joint(k).name for k in range(mjcf.njnt)) == HINGES
+    masses = [link.inertial.mass for link in urdf.link_map.values() if link.inertial]
+    # URDF needs a small link between a base joint's two hinges: 0.1 g for each of five fingers.
+    assert np.isclose(sum(masses) - 5e-4, mjcf.body_mass.sum(), rtol=1e-5)
+    assert len(list((built / "meshes").glob("*.obj"))) == 16
+
+
+def test_summary_names_links_masses_and_how_to_load(tmp_path, capsys):
+    assert main(["build", "--out", str(tmp_path / "left"), "--side", "left", "--wrist-joints"]) == 0
+    out = capsys.readouterr().out
+    assert "16 links, 20 hinges" in out
+    assert "thumb3" in out
+    assert f"mujoco.MjModel.from_xml_path('{tmp_path / 'left' / 'left_hand.xml'}')" in out
+    assert mujoco.MjModel.from_xml_path(str(tmp_path / "left" / "left_hand.xml")).nq == 26
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--shape", "nan"], "every coefficient must be finite"),
+        (["--shape", *["0"] * 40], "give a list of up to"),
+        (["--mano", "gone.pkl"], "gone.pkl"),
+    ],
+)
+def test_input_at_fault_is_one_line_status_2_and_no_output(tmp_path, capsys, arguments, message):
+    assert main(["build", "--out", str(tmp_path / "hand"), *arguments]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.startswith("mjx-hand: ")
+    assert message in printed.err
+    assert printed.err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_folder_that_cannot_be_written(tmp_path, capsys):
+    (tmp_path / "file").touch()
+    for out in (tmp_path / "file", tmp_path / "file" / "below"):
+        assert main(["build", "--out", str(out)]) == 2
+        printed = capsys.readouterr()
+        assert str(out) in printed.err
+        assert printed.err.count("\n") == 1
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize("arguments", [["build"], ["build", "--out", "x", "--shpae", "1"], ["bild"], []])
+def test_unknown_and_missing_options_exit_with_2(arguments, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(arguments)
+    assert stop.value.code == 2
