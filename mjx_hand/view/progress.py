@@ -1,0 +1,82 @@
+"""Progress of long work with an estimate of the time left: a bar on a terminal, a plain line now and then elsewhere."""
+
+import contextlib
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator, Sized
+from typing import TypeVar
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+T = TypeVar("T")
+
+SECONDS_BETWEEN_LINES = 10.0
+
+
+def progress(items: Iterable[T], description: str, total: int | None = None) -> Iterator[T]:
+    """Pass `items` on, showing how far it is; `total` is needed only where they have no length."""
+    if total is None and isinstance(items, Sized):
+        total = len(items)
+    with counter(total, description) as advance:
+        for item in items:
+            yield item
+            advance(1)
+
+
+@contextlib.contextmanager
+def counter(total: int | None, description: str) -> Iterator[Callable[[int], None]]:
+    """A context in which `advance(n)` says that n more of `total` are done; None where the total is not known."""
+    if sys.stdout.isatty():
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
+        )
+        with Progress(*columns, console=Console(file=sys.stdout)) as bar:
+            task = bar.add_task(description, total=total)
+            yield lambda count: bar.advance(task, count)
+    else:
+        lines = _Lines(total, description)
+        yield lines.advance
+        lines.write()
+
+
+class _Lines:
+    """Progress as lines of text, for logs: one after some seconds, one at the end."""
+
+    def __init__(self, total: int | None, description: str):
+        self.total, self.description = total, description
+        self.done = 0
+        self.start = self.written = time.monotonic()
+
+    def advance(self, count: int) -> None:
+        self.done += count
+        if time.monotonic() - self.written >= SECONDS_BETWEEN_LINES:
+            self.write()
+
+    def write(self) -> None:
+        self.written = time.monotonic()
+        took = self.written - self.start
+        if self.total is None or self.done >= self.total:
+            line = f"{self.description}: {self.done} in {clock(took)}"
+        else:
+            left = took / self.done * (self.total - self.done) if self.done else None
+            line = f"{self.description}: {self.done}/{self.total} in {clock(took)}"
+            line += f", about {clock(left)} left" if left is not None else ""
+        print(line, flush=True)
+
+
+def clock(seconds: float) -> str:
+    """A duration as people write it: 0.8 s, 42 s, 3 min 05 s, 2 h 07 min."""
+    if seconds < 10:
+        return f"{seconds:.1f} s"
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02d} s"
+    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
