@@ -72,9 +72,9 @@ class MakeHuman:
         vertices, faces = _read_obj(self._text("3dobjs/base.obj"))
         rig = json.loads(self._text("rigs/standard/rig.default.json"))
         bones = {
-            name: (bone["head"].get("cube_name"), bone["tail"].get("cube_name"))
+            name: (bone["head"]["cube_name"], bone["tail"]["cube_name"])
             for name, bone in rig.items()
-            if name.endswith(".R")
+            if bone["head"]["strategy"] == bone["tail"]["strategy"] == "CUBE"
         }
         entries = json.loads(self._text("rigs/standard/weights.default.json"))["weights"]
         weights = {}

@@ -17,7 +17,7 @@ MACRO_SPREAD = {"muscle": 0.08, "weight": 0.08, "height": 0.08, "proportions": 0
 # Local targets by their (decreasing, increasing) names. `fingers-distance` is a pose, so it is left out.
 LOCAL_SPREAD = {
     ("hands/r-hand-fingers-length-decr", "hands/r-hand-fingers-length-incr"): 0.15,
-    ("hands/r-hand-fingers-diameter-decr", "hands/r-hand-fingers-diameter-incr"): 0.4,
+    ("hands/r-hand-fingers-diameter-decr", "hands/r-hand-fingers-diameter-incr"): 0.25,
     ("hands/r-hand-scale-decr", "hands/r-hand-scale-incr"): 0.05,
     ("hands/measure-wrist-circ-decr", "hands/measure-wrist-circ-incr"): 0.3,
 }

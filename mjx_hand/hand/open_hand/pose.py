@@ -11,13 +11,14 @@ from mjx_hand.hand.joints import FINGERS, LINKS, PARENTS
 
 # Direction of each finger's bones in the flat reference pose: degrees above the palm's plane (towards the back of the
 # hand) and towards the thumb's side of straight ahead. The fingers keep the source's mean splay, which is MANO's to a
-# few degrees; the thumb is opened to lie beside the palm as in MANO's flat hand (the source has it 43 degrees below).
+# few degrees. The thumb is raised towards the palm's plane, where MANO's flat hand has it (the source's metacarpal
+# points 43 degrees below); raising it further folds the skin between thumb and index finger.
 FLAT = {
     "index": ((0, 7), (0, 7), (0, 7)),
     "middle": ((0, -6), (0, -6), (0, -6)),
     "pinky": ((0, -24), (0, -24), (0, -24)),
     "ring": ((0, -16), (0, -16), (0, -16)),
-    "thumb": ((-20, 52), (-15, 36), (-15, 22)),
+    "thumb": ((-25, 58), (-22, 42), (-25, 28)),
 }
 
 
