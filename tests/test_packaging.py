@@ -57,7 +57,8 @@ def run(command: list[str | Path], folder: Path) -> str:
 def test_wheel_holds_code_configurations_and_the_open_hand(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     for top in ("mjx_hand", "envs", "train", "configs"):
-        sources = {str(p.relative_to(ROOT)) for p in (ROOT / top).rglob("*") if p.suffix in (".py", ".yaml", ".npz")}
+        files = [p for p in (ROOT / top).rglob("*") if p.is_file() and "__pycache__" not in p.parts]
+        sources = {str(p.relative_to(ROOT)) for p in files}
         assert sources <= names, f"missing: {sorted(sources - names)}"
     assert any(name.startswith("mjx_hand/hand/open_hand/") and name.endswith(".npz") for name in names)
     assert "mjx_hand/py.typed" in names
