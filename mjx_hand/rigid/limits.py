@@ -28,7 +28,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "dip_flexion": (-10, 90),  # AAOS: 0 to 90
     # The thumb's rest pose is already abducted, so the clinical ranges, counted from contact with the
     # index finger, are shifted: about half of the abduction is behind it.
-    "thumb_cmc_abduction": (-35, 25),  # Barakat: 63 from contact; Cooney: 42 by roentgenogram, without the skin
+    "thumb_cmc_abduction": (-35, 30),  # Barakat: 63 from contact; Cooney: 42 by roentgenogram, without the skin
     "thumb_cmc_flexion": (-20, 60),  # Barakat: 61 of palmar abduction and 10 of adduction behind the palm
     "thumb_mcp_flexion": (-15, 60),  # Barakat
     "thumb_ip_flexion": (-20, 88),  # AAOS: 20 of extension; Barakat: 88 of flexion

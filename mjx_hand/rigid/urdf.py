@@ -17,17 +17,17 @@ from mjx_hand.rigid.mesh_folder import MESHES, file_stem, filling, write_meshes
 from mjx_hand.rigid.mjcf import WRIST_REACH, WRIST_SLIDES, WRIST_TURNS
 from mjx_hand.rigid.rigid_hand import RigidHand
 
-# Links that carry no flesh. Zero would be singular in most simulators; these are under a thousandth of a finger's.
-_SMALL_MASS = 1e-4  # kg
-_SMALL_INERTIA = 1e-8 * np.eye(3)  # kg m^2
+# Links that carry no flesh. Without mass most simulators are singular, and PyBullet assumes a kilogram.
+_SMALL_MASS = 1e-5  # kg
+_SMALL_INERTIA = 1e-9 * np.eye(3)  # kg m^2
 _WRIST_FORCE, _WRIST_TORQUE, _WRIST_SPEED = 200.0, 20.0, 2.0  # N, N m, m/s: what the limits of the wrist's joints state
 
 
 def write_urdf(rigid: RigidHand, folder: str | Path, *, wrist_joints: bool = False, gains: Gains | None = None) -> Path:
     """Write `<side>_hand.urdf` and `meshes/*.obj`, with paths relative to the folder; returns the URDF's path.
 
-    Links are named as `hand.joints.LINKS`, joints as `HINGES`; finger tips are massless frames `<finger>_tip` on fixed
-    joints. The folder appears whole or not at all.
+    Links are named as `hand.joints.LINKS`, joints as `HINGES`; finger tips are links `<finger>_tip` on fixed joints.
+    The folder appears whole or not at all.
 
     Args:
         rigid: the hand.
@@ -68,7 +68,7 @@ def urdf_tree(rigid: RigidHand, *, wrist_joints: bool, gains: Gains) -> ET.Eleme
             parent, offset = between, np.zeros(3)
         _add_hinge(robot, rigid, hinges[-1], parent, LINKS[link], offset, gains)
     for finger, link, tip in zip(FINGERS, TIP_LINKS, rigid.tip_offset, strict=True):
-        ET.SubElement(robot, "link", name=f"{finger}_tip")
+        _add_small_link(robot, f"{finger}_tip")
         _add_joint(robot, f"{finger}_tip_fixed", "fixed", LINKS[link], f"{finger}_tip", tip)
     return robot
 

@@ -31,8 +31,8 @@ def test_capsules_follow_the_skin(hand, rigid):
     for link in range(1, 16):
         off = np.abs(surface_distance(skin(hand, rigid, link), *capsules(rigid, link)))
         base = LINKS[link].endswith("1")  # skin there runs on into the webs, which are no tube
-        assert off.mean() < (3e-3 if base else 2e-3)
-        assert np.median(off) < (2.5e-3 if base else 1.5e-3)
+        assert off.mean() < (3.5e-3 if base else 2e-3)
+        assert np.median(off) < (3e-3 if base else 1.5e-3)
     assert (rigid.capsule_radius > 4e-3).all()
     assert (rigid.capsule_radius < 2.5e-2).all()
 
