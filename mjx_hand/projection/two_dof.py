@@ -22,8 +22,8 @@ def project_two_dof(
         φ = atan2((a1 x a2) · R a2, (a2 - (a1·a2) a1) · R a2),
 
     the turn about a1 that brings a2 in line with R a2, seen along a1; θ is the best single hinge for what is left,
-    R_a1(φ)ᵀ R. The pair is unique unless N's singular values are equal (parallel axes, or a twist of a quarter turn
-    about a1 x a2): a whole family is then equally good, and its member φ = 0 is returned.
+    R_a1(φ)ᵀ R. The pair is unique unless N's singular values are equal: for parallel axes, or, for orthogonal ones,
+    where the nearest rotation is 90 degrees away. Of the family that is then equally good, φ = 0 is returned.
 
     The gradients, in the rotation and in the axes, are those of the formulas, and finite at the ties too.
 

@@ -106,3 +106,12 @@ def test_near_a_tie_rounding_costs_nothing(distance):
     with jax.enable_x64(True):
         best = residual(near, axes, np.stack(project_two_dof(near, axes[:, 0], axes[:, 1]), axis=-1))
     assert np.max(residual(near, axes, np.asarray(solve(near, axes))) - best) < 1e-3
+
+
+def test_length_of_the_arguments_is_the_cosine_of_what_remains():
+    """For orthogonal axes; so the angles are well determined wherever the hinges come within 90 degrees."""
+    rotations, axes = random_rotations(40, 17), axis_pairs(40, 18, 0.0)
+    moved = np.einsum("nij,nj->ni", rotations, axes[:, 1])
+    length = np.hypot(np.sum(np.cross(axes[:, 0], axes[:, 1]) * moved, axis=1), np.sum(axes[:, 1] * moved, axis=1))
+    remains = residual(rotations, axes, np.asarray(solve(rotations, axes)))
+    np.testing.assert_allclose(length, np.cos(np.radians(remains)), atol=1e-5)

@@ -1,0 +1,37 @@
+import numpy as np
+import pytest
+
+from train.benchmark_retarget import SCIPY, main
+
+SMALL = ["--poses", "60", "--runs", "1", "--scipy-poses", "1"]
+
+
+def rows(text, heading):
+    """The table under a heading: first cell to the others."""
+    lines = text.split(heading, 1)[1].split("\n## ", 1)[0].splitlines()
+    cells = [[c.strip() for c in line.strip("|").split("|")] for line in lines if line.startswith("|")]
+    return {row[0]: row[1:] for row in cells[2:]}
+
+
+def test_report_has_the_exact_projection_equal_to_scipy_and_below_the_others(capsys, recordings):
+    assert main([*SMALL, "--recording", str(recordings / "dexmv_mustard" / "sequence.npz")]) == 0
+    text = capsys.readouterr().out
+    for heading in ("100 random anatomical poses", "dexmv_mustard/sequence.npz"):
+        table = rows(text, heading)
+        errors = {m: np.array([float(x) for x in row[0].split(" / ")]) for m, row in table.items() if row[0]}
+        np.testing.assert_allclose(errors["exact"], errors[SCIPY], atol=2e-3)
+        assert errors["exact"][0] < min(errors[m][0] for m in ("paper", "naive", "bch2"))
+        np.testing.assert_allclose(errors["paper"], errors["naive"], atol=2e-3)
+    speed = rows(text, "One call over 60 poses")
+    assert all(float(speed[m][3].replace(",", "")) > 1 for m in ("exact", "paper", "naive", "bch2"))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [(["--poses", "0"], "poses is 0; give at least 1"), (["--recording", "absent.npz"], "absent.npz: no such file")],
+)
+def test_bad_options_end_in_one_line_and_status_2(options, message, capsys):
+    assert main([*SMALL, *options]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
