@@ -17,6 +17,7 @@ from mjx_hand.hand.joints import NUM_LINKS, PARENTS, TIP_LINKS
 from mjx_hand.hand.model import HandModel
 from mjx_hand.motion.archive import open_arrays
 
+LARGEST = 2**32  # the root's entry in the joint tree; no other number of a hand comes near
 MAX_SHAPE = 10  # some files carry more components than the ten that recordings use
 # Finger tips of MANO's own 778-vertex mesh, by the usual convention, in the order of `joints.FINGERS`.
 MANO_VERTICES = 778
@@ -47,8 +48,8 @@ def load_mano_file(path: str | Path, side: str = "right") -> HandModel:
         except Exception as error:  # a damaged value raises anything at all
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise InputError(f"{path}: cannot read {key!r} ({reason}); copy the file again") from None
-        if not np.isfinite(found).all():
-            raise InputError(f"{path}: {key!r} has NaN or infinity; copy the file again")
+        if not (np.abs(found.astype(np.float64)) <= LARGEST).all():
+            raise InputError(f"{path}: {key!r} has NaN, infinity or numbers beyond {LARGEST}; copy the file again")
         return found
 
     template = _shaped(path, "v_template", get, (None, 3)).astype(np.float32)

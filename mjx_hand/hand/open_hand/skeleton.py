@@ -16,8 +16,8 @@ JOINTS = len(BONES)
 
 
 # MakeHuman sets the index knuckle about 9 mm too far out: its proximal phalanx (27 mm) would be hardly longer than the
-# middle one (24 mm), and the metacarpal the longest of all. Moving it back by this share of the way to the wrist gives
-# lengths in the proportion of hand anthropometry (Buchholz et al. 1992, https://doi.org/10.1080/00140139208967812).
+# middle one (24 mm, where anthropometry has 5 : 3, Buchholz et al. 1992, https://doi.org/10.1080/00140139208967812),
+# and its metacarpal the longest of all. The knuckle is moved back by this share of the way to the wrist.
 INDEX_KNUCKLE_BACK = 0.085
 
 

@@ -1,0 +1,258 @@
+"""No byte of a hand file is ever run."""
+
+import contextlib
+import os
+import pickle
+import subprocess
+import tracemalloc
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.sparse import csc_matrix
+
+from mjx_hand.errors import InputError
+from mjx_hand.hand import inert_pickle
+from mjx_hand.hand.load import load_hand
+
+from .mano_layout import as_python2, chumpy, official
+from .test_mano_file import HAND
+
+
+class Call:
+    """Pickles as a call of `function`, as an attacker's file would."""
+
+    def __init__(self, function: Any, *args: Any):
+        self.call = (function, args)
+
+    def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
+        return self.call
+
+
+CALLS = {
+    "os.system": lambda mark: Call(os.system, f"touch {mark}"),
+    "builtins.eval": lambda mark: Call(eval, f"open({str(mark)!r}, 'w')"),
+    "builtins.exec": lambda mark: Call(exec, f"open({str(mark)!r}, 'w')"),
+    "builtins.open": lambda mark: Call(open, str(mark), "w"),
+    "subprocess.Popen": lambda mark: Call(subprocess.Popen, ["touch", str(mark)]),
+    "builtins.getattr": lambda mark: Call(getattr, str(mark), "upper"),
+    "a placeholder's argument": lambda mark: {
+        "v_template": csc_matrix((1, 1)),
+        "x": [Call(os.system, f"touch {mark}")],
+    },
+}
+
+
+@pytest.mark.parametrize("protocol", range(6))
+@pytest.mark.parametrize("name", CALLS)
+def test_calls_are_refused_by_name_and_not_run(tmp_path: Path, name: str, protocol: int) -> None:
+    mark = tmp_path / "ran"
+    path = tmp_path / "MANO_RIGHT.pkl"
+    path.write_bytes(pickle.dumps({"v_template": CALLS[name](mark)}, protocol))
+    with pytest.raises(InputError, match="refused, since it names") as caught:
+        load_hand(path)
+    assert not mark.exists()
+    assert "\n" not in str(caught.value)
+    if "." in name and name != "os.system":
+        assert name.split(".")[1] in str(caught.value)
+    elif name == "os.system":
+        assert "posix.system" in str(caught.value) or "nt.system" in str(caught.value)
+
+
+def stack_global(module: str, name: str) -> bytes:
+    def text(value: str) -> bytes:
+        return pickle.SHORT_BINUNICODE + bytes([len(value)]) + value.encode()
+
+    return b"\x80\x04" + text(module) + text(name) + b"\x93"
+
+
+@pytest.mark.parametrize(
+    ("module", "name"),
+    [
+        ("numpy", "load"),
+        ("numpy.testing._private.utils", "runstring"),
+        ("numpy._core.multiarray", "fromfile"),
+        ("numpy.f2py", "compile"),
+        ("numpy", "ndarray.tofile"),
+        ("numpy", "dtype.__class__.__base__"),
+        ("numpy", "os.system"),
+        ("scipy.sparse", "load_npz"),
+        ("scipy.sparse._csc", "csc_matrix.__init__.__globals__"),
+        ("scipy.io.matlab", "loadmat"),
+        ("chumpy.ch", "ChLambda"),
+        ("chumpy", "os.system"),
+        ("builtins", "object.__subclasses__"),
+        ("copyreg", "__newobj__"),
+        ("copyreg", "add_extension"),
+        ("_codecs", "lookup"),
+        ("mjx_hand.hand.inert_pickle", "_Reader"),
+        ("__main__", "x"),
+        ("", ""),
+    ],
+)
+def test_names_hidden_under_trusted_packages_are_refused(module: str, name: str) -> None:
+    with pytest.raises(InputError, match="refused, since it names"):
+        inert_pickle.read(stack_global(module, name) + b")R.", "file")
+    if "." not in name:
+        old_style = b"c" + module.encode() + b"\n" + name.encode() + b"\n)R."
+        with pytest.raises(InputError, match="refused, since it names"):
+            inert_pickle.read(old_style, "file")
+
+
+@pytest.mark.parametrize("data", [b"Pid\n.", b"\x80\x02NQ."], ids=["PERSID", "BINPERSID"])
+def test_persistent_ids_are_refused(data: bytes) -> None:
+    with pytest.raises(InputError, match="persistent id"):
+        inert_pickle.read(data, "file")
+
+
+@pytest.mark.parametrize("data", [b"\x82\x01.", b"\x83\x01\x00.", b"\x84\x01\x00\x00\x00."])
+def test_extension_codes_are_refused(data: bytes) -> None:
+    with pytest.raises(InputError, match="not a readable pickle"):
+        inert_pickle.read(data, "file")
+
+
+def test_a_file_cannot_alter_how_the_next_one_is_read() -> None:
+    """BUILD on a class would set attributes on it; every load makes its classes anew."""
+    planted = b"cnumpy\nndarray\n(NU\x0c__setstate__Ndtb."  # (None, {"__setstate__": None}) as the class's slot state
+    with pytest.raises(InputError):
+        inert_pickle.read(planted, "file")
+    value = np.arange(6.0).reshape(2, 3)
+    np.testing.assert_array_equal(inert_pickle.array(inert_pickle.read(pickle.dumps({"a": value}), "file")["a"]), value)
+
+
+def test_known_objects_are_records_and_not_the_real_thing() -> None:
+    read = inert_pickle.read(pickle.dumps({"a": np.zeros(3), "m": csc_matrix((2, 2))}), "file")
+    assert not isinstance(read["a"], np.ndarray)
+    assert type(read["m"]).__module__ == "mjx_hand.hand.inert_pickle"
+
+
+@pytest.mark.parametrize("protocol", range(6))
+@pytest.mark.parametrize(
+    "value",
+    [
+        np.arange(12, dtype=np.int32).reshape(3, 4),
+        np.asfortranarray(np.arange(12.0).reshape(3, 4)),
+        np.arange(12, dtype=">u2")[::2],
+        np.array([True, False]),
+        np.float32(2.5),
+    ],
+    ids=["int", "fortran", "big-endian", "bool", "scalar"],
+)
+def test_arrays_keep_their_values_through_every_protocol(value: Any, protocol: int) -> None:
+    found = inert_pickle.array(inert_pickle.read(pickle.dumps({"a": value}, protocol), "file")["a"])
+    np.testing.assert_array_equal(found, value)
+    assert found.dtype == np.asarray(value).dtype.newbyteorder("=")
+
+
+def test_python2_strings_become_arrays() -> None:
+    value = np.random.default_rng(0).normal(size=(4, 5))  # its bytes are no valid UTF-8
+    np.testing.assert_array_equal(inert_pickle.array(inert_pickle.read(as_python2({"a": value}), "f")["a"]), value)
+
+
+@pytest.mark.parametrize(
+    ("part", "value"),
+    [
+        ("indices", np.array([0, 5])),
+        ("indices", np.array([0, -1])),
+        ("indptr", np.array([0, 1])),
+        ("indptr", np.array([0, 9, 2])),
+        ("_shape", (10**9, 2)),
+        ("_shape", None),
+        ("data", np.zeros(9)),
+    ],
+)
+def test_contradictory_sparse_matrices_are_refused(part: str, value: Any) -> None:
+    matrix = csc_matrix(np.eye(2))
+    matrix.__dict__[part] = value
+    record = inert_pickle.read(pickle.dumps({"m": matrix}), "file")["m"]
+    with pytest.raises((ValueError, TypeError)):
+        inert_pickle.array(record)
+
+
+def test_selection_outside_its_source_is_refused() -> None:
+    with chumpy() as ch:
+        data = pickle.dumps({"s": ch.Select(a=ch.Ch(x=np.zeros(3)), idxs=np.array([7]))})
+    with pytest.raises(IndexError):
+        inert_pickle.array(inert_pickle.read(data, "file")["s"])
+
+
+@pytest.mark.parametrize("value", [[1, 2], "text", None, 3.0])
+def test_a_pickle_without_a_dictionary_is_refused(value: Any) -> None:
+    with pytest.raises(InputError, match=f"holds a {type(value).__name__}, expected a MANO file's dictionary"):
+        inert_pickle.read(pickle.dumps(value), "file")
+
+
+@pytest.mark.parametrize("data", [b"", b"\x80", b"not a pickle", b"\x80\x63.", bytes(100)])
+def test_what_is_no_pickle_is_refused(data: bytes) -> None:
+    with pytest.raises(InputError, match="not a readable pickle"):
+        inert_pickle.read(data, "file")
+
+
+WHOLE = official(HAND)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.1, 0.5, 0.9, 0.999])
+def test_truncated_file_is_refused(tmp_path: Path, share: float) -> None:
+    path = tmp_path / "MANO_RIGHT.pkl"
+    path.write_bytes(WHOLE[: int(share * len(WHOLE))])
+    with pytest.raises(InputError, match="not a readable pickle"):
+        load_hand(path)
+
+
+SKELETON = pickle.dumps({"a": np.arange(3), "m": csc_matrix(np.eye(2)), "s": "x"}, 2)
+
+
+@contextlib.contextmanager
+def one_line_input_error() -> Iterator[None]:
+    """What runs inside may succeed, or raise an `InputError` of one line; anything else fails the test."""
+    try:
+        yield
+    except InputError as error:
+        message = str(error)
+    else:
+        return
+    assert "\n" not in message
+
+
+@settings(deadline=None, max_examples=300)
+@given(place=st.integers(0, 8 * len(SKELETON) - 1))
+def test_flipped_bits_raise_an_input_error_or_load_inertly(place: int) -> None:
+    data = bytearray(SKELETON)
+    data[place // 8] ^= 1 << place % 8
+    with one_line_input_error():
+        for value in inert_pickle.read(bytes(data), "file").values():
+            with contextlib.suppress(Exception):  # `load_mano_file` turns whatever it is into an InputError
+                inert_pickle.array(value)
+
+
+@settings(deadline=None, max_examples=200)
+@given(data=st.binary(max_size=60), protocol=st.sampled_from([b"", b"\x80\x02", b"\x80\x04"]))
+def test_random_bytes_never_run(data: bytes, protocol: bytes) -> None:
+    with pytest.raises(InputError):
+        inert_pickle.read(protocol + data, "file")
+
+
+@settings(deadline=None, max_examples=40)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_damaged_whole_files_load_or_raise_input_errors(tmp_path_factory, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    data = bytearray(WHOLE)
+    for place in rng.integers(0, 400 if seed % 2 else len(data), 3):
+        data[place] ^= 1 << int(rng.integers(8))
+    path = tmp_path_factory.getbasetemp() / "damaged.pkl"
+    path.write_bytes(data)
+    with one_line_input_error():
+        load_hand(path)
+
+
+def test_a_huge_memo_index_or_length_takes_no_memory() -> None:
+    tracemalloc.start()
+    for data in (b"\x80\x02Nr\xff\xff\xff\x7f.", b"\x80\x04\x8e" + (2**40).to_bytes(8, "little") + b"x."):
+        with pytest.raises(InputError):
+            inert_pickle.read(data, "file")
+    assert tracemalloc.get_traced_memory()[1] < 10**8
+    tracemalloc.stop()
