@@ -45,7 +45,7 @@ _STYLE: dict[Any, Any] = {
 
 @mpl.rc_context(_STYLE)
 def learning_curve(
-    steps: Float[Array, "k"],
+    steps: Float[Array, "_"],
     values: Float[Array, "*s k"],
     *,
     baseline: float | None = None,
@@ -222,6 +222,8 @@ def inline_svg(figure: Figure, name: str) -> str:
         figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
     text = buffer.getvalue()
     element = text[text.index("<svg") :]
+    for reference in ('id="', "url(#", 'href="#'):  # matplotlib names groups alike in every figure
+        element = element.replace(reference, f"{reference}{name}-")
     return element.replace(_INK, "currentColor").replace("'DejaVu Sans'", "inherit")
 
 

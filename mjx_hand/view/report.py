@@ -51,7 +51,7 @@ class Report:
         video: an MP4 file, or None.
         video_missing: why there is no video; required where there is none.
         video_caption: what the video shows.
-        learning_curve, tracking, projection: figures of `plots`.
+        learning_curve, tracking, projection, retargeting: figures of `plots`.
         success: metrics, a row each, for policy, baseline and what was published.
         failures: how failed rollouts failed.
         how: (what, value) rows of how it was made: versions, hardware, seeds, timings.
@@ -69,6 +69,7 @@ class Report:
     success: Table | None = None
     failures: Table | None = None
     projection: Plot | None = None
+    retargeting: Plot | None = None
     how: Sequence[tuple[str, str]] = ()
     commands: Sequence[str] = ()
 
@@ -96,7 +97,7 @@ def _html(report: Report) -> str:
     template = environment.from_string(Path(__file__).with_name("report.html.j2").read_text(encoding="utf-8"))
     plots = {
         name: Markup(inline_svg(plot.figure, name))
-        for name in ("learning_curve", "tracking", "projection")
+        for name in ("learning_curve", "tracking", "projection", "retargeting")
         if (plot := getattr(report, name)) is not None
     }
     video = None if report.video is None else base64.b64encode(report.video.read_bytes()).decode("ascii")

@@ -3,8 +3,9 @@
 # MuJoCo's classes come from compiled code without type stubs.
 # pyright: reportAttributeAccessIssue=false
 
+import contextlib
 import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable, Sequence
 from pathlib import Path
 
 import mujoco
@@ -28,15 +29,18 @@ def render_frames(
     qpos: Float[np.ndarray, "t nq"],
     camera: Camera | None = None,
     *,
+    watched: Float[np.ndarray, "_ _"] | None = None,
     size: tuple[int, int] = (640, 480),
     caption: str = "",
-) -> Iterator[Frame]:
+) -> Generator[Frame, None, None]:
     """Yield a picture a row of qpos.
 
     Args:
         model: the scene, with visual meshes; it is left as it is.
         qpos: what to show.
         camera: the default follows the body "object".
+        watched: the take whose object the camera follows, so that two takes side by side are seen alike; the default
+            is qpos itself.
         size: width and height in pixels, both even.
         caption: written into the top left corner.
 
@@ -50,19 +54,21 @@ def render_frames(
         raise InputError(f"size is {width}x{height}; H.264 needs an even width and height, such as 640x480")
     if qpos.shape[1] != model.nq:
         raise InputError(f"qpos has {qpos.shape[1]} columns, but the model has {model.nq}; give that model's own qpos")
-    return _frames(model, qpos, camera, size, caption)
+    watched = qpos if watched is None else watched
+    if watched.shape != qpos.shape:
+        raise InputError(f"watched has shape {watched.shape}, but qpos has {qpos.shape}; give takes of one length")
+    return _frames(model, qpos, camera_path(model, watched, camera), size, caption)
 
 
 def _frames(
     model: mujoco.MjModel,
     qpos: Float[np.ndarray, "t nq"],
-    camera: Camera,
+    path: Sequence[mujoco.MjvCamera],
     size: tuple[int, int],
     caption: str,
-) -> Iterator[Frame]:
+) -> Generator[Frame, None, None]:
     shown = studio_model(model, *size)
     data = mujoco.MjData(shown)
-    path = camera_path(shown, qpos, camera)
     option = mujoco.MjvOption()
     option.geomgroup[3] = 1  # the collision shapes too: studio_model() makes them part of the look
     label = _Caption(caption, size) if caption else None
@@ -78,11 +84,14 @@ def _frames(
             yield label.drawn_on(frame) if label else frame
 
 
-def beside(left: Iterator[Frame], right: Iterator[Frame], gap: int = 4) -> Iterator[Frame]:
+def beside(
+    left: Generator[Frame, None, None], right: Generator[Frame, None, None], gap: int = 4
+) -> Generator[Frame, None, None]:
     """Frames of two takes side by side, as long as the shorter one, with `gap` pixels (even) between."""
-    for a, b in zip(left, right, strict=False):
-        between = np.full((a.shape[0], gap, 3), 255, np.uint8)
-        yield np.concatenate([a, between, b], axis=1)
+    with contextlib.closing(left), contextlib.closing(right):  # the longer one's renderer must not linger
+        for a, b in zip(left, right, strict=False):
+            between = np.full((a.shape[0], gap, 3), 255, np.uint8)
+            yield np.concatenate([a, between, b], axis=1)
 
 
 def write_video(path: str | Path, frames: Iterable[Frame], fps: float) -> None:
