@@ -88,10 +88,10 @@ def test_captions_change_their_corner_alone(frames):
 
 
 def test_a_watched_take_decides_where_the_camera_is():
-    still = np.tile(way()[:1], (3, 1))
+    near, still = Camera(smoothing=0.1, distance=1.0), np.tile(way()[:1], (3, 1))
     own, other = (
-        [np.argwhere(red(frame)).mean(axis=0) for frame in render_frames(scene(), way(), watched=watched, size=SIZE)]
-        for watched in (None, still)
+        [np.argwhere(red(frame)).mean(axis=0) for frame in render_frames(scene(), way(), near, watched=take, size=SIZE)]
+        for take in (None, still)
     )
     assert np.linalg.norm(own[2] - own[0]) < 20
     assert np.linalg.norm(other[2] - other[0]) > 40
