@@ -26,8 +26,8 @@ class ShapeSpace:
 def fit_shape_space(vertices: np.ndarray, joints: np.ndarray) -> ShapeSpace:
     """Principal components of hands (n, v, 3), and the joints (n, 16, 3) by least squares on the same scores.
 
-    A component's sign makes its largest effect on length positive: +beta lengthens the hand along -x or, for a
-    component that hardly changes length, moves the vertex that it moves most in that vertex's largest axis.
+    The sign of a component is free; here +beta lengthens the hand or, where a component changes its length by less than
+    a millimetre, makes the component's largest entry positive.
     """
     n, v = vertices.shape[:2]
     mean = vertices.mean(axis=0)
@@ -37,7 +37,8 @@ def fit_shape_space(vertices: np.ndarray, joints: np.ndarray) -> ShapeSpace:
     directions = data.T @ scores / np.sqrt(n)  # one standard deviation each
     strongest = np.abs(directions).argmax(axis=0)
     sign = np.sign(directions[strongest, np.arange(COMPONENTS)])
-    reach = -(directions.reshape(v, 3, COMPONENTS)[mean[:, 0].argmin(), 0] - _wrist_side(mean, directions))
+    along = directions.reshape(v, 3, COMPONENTS)[:, 0]
+    reach = along[mean[:, 0].argmax()] - along[mean[:, 0].argmin()]  # the forearm's end against the middle finger's tip
     sign = np.where(np.abs(reach) > 1e-3, np.sign(reach), sign)
     directions, beta = directions * sign, scores * np.sqrt(n) * sign
 
@@ -52,10 +53,6 @@ def fit_shape_space(vertices: np.ndarray, joints: np.ndarray) -> ShapeSpace:
         residual=float(np.sqrt((residual**2).sum() / (n * v))),
         explained=float(1 - (residual**2).sum() / (data**2).sum()),
     )
-
-
-def _wrist_side(mean: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    return directions.reshape(len(mean), 3, -1)[mean[:, 0].argmax(), 0]
 
 
 def fit_joint_regressor(space: ShapeSpace) -> tuple[np.ndarray, float]:
