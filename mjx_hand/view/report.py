@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import jinja2
-from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from mjx_hand.errors import InputError
@@ -96,7 +95,7 @@ def _html(report: Report) -> str:
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
     template = environment.from_string(Path(__file__).with_name("report.html.j2").read_text(encoding="utf-8"))
     plots = {
-        name: Markup(inline_svg(plot.figure, name))
+        name: inline_svg(plot.figure, name)
         for name in ("learning_curve", "tracking", "projection", "retargeting")
         if (plot := getattr(report, name)) is not None
     }

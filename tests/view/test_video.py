@@ -88,13 +88,13 @@ def test_captions_change_their_corner_alone(frames):
 
 
 def test_a_watched_take_decides_where_the_camera_is():
-    near, still = Camera(smoothing=0.1, distance=1.0), np.tile(way()[:1], (3, 1))
+    near, still = Camera(smoothing=0.1, distance=0.8), np.tile(way()[:1], (3, 1))
     own, other = (
         [np.argwhere(red(frame)).mean(axis=0) for frame in render_frames(scene(), way(), near, watched=take, size=SIZE)]
         for take in (None, still)
     )
-    assert np.linalg.norm(own[2] - own[0]) < 20
-    assert np.linalg.norm(other[2] - other[0]) > 40
+    assert np.linalg.norm(own[2] - own[0]) < 8
+    assert np.linalg.norm(other[2] - other[0]) > 16
 
 
 @pytest.mark.parametrize(
