@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 PIP_FLAGS := --quiet --disable-pip-version-check
-# Two workers suit the usual test run, which spends its time in JAX compilations.
+# A file's tests stay with one worker: they share hands and compiled functions.
 WORKERS ?= 2
 
 .DEFAULT_GOAL := help
@@ -39,7 +39,7 @@ demo: $(STAMP)  ## retarget a recording, train a pinch policy, write a report wi
 	$(BIN)/python -m train.demo
 
 test: $(STAMP)  ## run the tests
-	$(BIN)/python -m pytest -n $(WORKERS)
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
 
 test-slow: $(STAMP)  ## run the tests that take more than a minute each
 	$(BIN)/python -m pytest -m slow
