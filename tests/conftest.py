@@ -1,13 +1,15 @@
 """What all tests share: shape checks at run time, kept compilations, off-screen rendering, real recordings."""
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
 from jaxtyping import install_import_hook
 
-# Before MuJoCo's first import, which reads it.
-os.environ.setdefault("MUJOCO_GL", "egl")
+# Before MuJoCo's first import, which reads it: draw without a display. Other systems need no such choice.
+if sys.platform == "linux":
+    os.environ.setdefault("MUJOCO_GL", "egl")
 
 # Before any of these packages is imported: every signature's shapes and types are then checked as the tests run.
 install_import_hook(["mjx_hand", "envs", "train"], "beartype.beartype")

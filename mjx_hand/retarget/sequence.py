@@ -62,7 +62,7 @@ def retarget_sequence(motion: Motion, rigid: RigidHand, method: str = "exact") -
         InputError: the motion is not well formed, or the method is unknown.
     """
     check_motion(motion)
-    angles = np.asarray(project(jnp.asarray(motion.rotations, jnp.float32), rigid, method))
+    angles = np.asarray(project(_recorded(motion), rigid, method))
     return JointMotion(
         fps=motion.fps,
         angles=fill_lines(angles, motion.valid),
@@ -83,11 +83,14 @@ def retarget_errors(motion: Motion, joint_motion: JointMotion, rigid: RigidHand)
     frames, projected = motion.num_frames, joint_motion.num_frames
     if frames != projected:
         raise InputError(f"the motion has {frames} frames and the joint motion {projected}; give the pair that belongs")
-    errors = _errors(
-        jnp.asarray(motion.rotations, jnp.float32), jnp.asarray(joint_motion.angles, jnp.float32), _bare(rigid)
-    )
+    errors = _errors(_recorded(motion), jnp.asarray(joint_motion.angles, jnp.float32), _bare(rigid))
     rotation, joint, tip = (np.where(motion.valid[:, None], np.asarray(e), 0.0) for e in errors)
     return RetargetErrors(rotation=rotation, joint_position=joint, tip_position=tip, valid=motion.valid)
+
+
+def _recorded(motion: Motion) -> Float[Array, "t 15 3 3"]:
+    """The rotations as JAX takes them; the identity in gaps, whatever stands there."""
+    return jnp.asarray(np.where(motion.valid[:, None, None, None], motion.rotations, np.eye(3)), jnp.float32)
 
 
 def _bare(rigid: RigidHand) -> RigidHand:

@@ -1,8 +1,11 @@
 """`load_motion`: what it recognises, and what it says to everything else."""
 
+import sys
+
 import numpy as np
 import pytest
 
+from mjx_hand.capture import datasets
 from mjx_hand.capture.datasets.dataset_format import dataset_formats
 from mjx_hand.capture.load import load_motion
 from mjx_hand.errors import InputError
@@ -27,6 +30,19 @@ def test_own_motion_file_is_recognised(tmp_path):
 
 def test_every_module_of_the_package_is_found():
     assert [f.name.split()[0] for f in dataset_formats()] == ["DexMV", "mjx-hand"]
+
+
+def test_a_format_is_added_by_one_file(tmp_path, monkeypatch):
+    (tmp_path / "still.py").write_text(
+        "import numpy as np\n"
+        "from mjx_hand.capture.datasets.dataset_format import DatasetFormat\n"
+        "from tests.capture.test_load import flat_motion\n"
+        "FORMAT = DatasetFormat('Still', lambda path, arrays: path.suffix == '.still', lambda p, a: flat_motion(7))\n"
+    )
+    monkeypatch.setattr(datasets, "__path__", [*datasets.__path__, str(tmp_path)])
+    (tmp_path / "hand.still").write_text("still")
+    assert load_motion(tmp_path / "hand.still").num_frames == 7
+    monkeypatch.delitem(sys.modules, "mjx_hand.capture.datasets.still")
 
 
 def test_joint_motion_is_named_as_what_it_is(tmp_path):

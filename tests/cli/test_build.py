@@ -6,7 +6,7 @@ import pytest
 import yourdfpy
 
 from mjx_hand.cli.main import main
-from mjx_hand.hand.joints import HINGES
+from mjx_hand.hand.joints import HINGES, LINKS
 
 
 @pytest.fixture(scope="module")
@@ -21,9 +21,8 @@ def test_both_descriptions_load_and_agree(built):
     mjcf = mujoco.MjModel.from_xml_path(str(built / "right_hand.xml"))
     assert tuple(urdf.actuated_joint_names) == HINGES
     assert tuple(mjcf.joint(k).name for k in range(mjcf.njnt)) == HINGES
-    masses = [link.inertial.mass for link in urdf.link_map.values() if link.inertial]
-    # URDF needs a small link between a base joint's two hinges: 0.1 g for each of five fingers.
-    assert np.isclose(sum(masses) - 5e-4, mjcf.body_mass.sum(), rtol=1e-5)
+    masses = {name: (urdf.link_map[name].inertial.mass, mjcf.body(name).mass[0]) for name in LINKS}
+    assert all(np.isclose(*pair, rtol=1e-4) for pair in masses.values()), masses
     assert len(list((built / "meshes").glob("*.obj"))) == 16
 
 
