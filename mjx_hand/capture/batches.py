@@ -5,10 +5,9 @@ from collections.abc import Callable
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
 
 from mjx_hand.capture.linearise import PoseState
-from mjx_hand.capture.pose_solver import Frames, solve_poses
+from mjx_hand.capture.pose_solver import Frames, PoseEstimate, solve_poses
 from mjx_hand.capture.skinned_points import SkinnedPoints
 
 CHUNK = 512  # frames a call
@@ -60,16 +59,14 @@ class Meter:
             self._listener(min(self._done / self._total, 1.0))
 
 
-def solve_all(
-    points: SkinnedPoints, frames: Frames, state: PoseState, iterations: int, meter: Meter
-) -> tuple[PoseState, Float[Array, "b m 3"]]:
+def solve_all(points: SkinnedPoints, frames: Frames, state: PoseState, iterations: int, meter: Meter) -> PoseEstimate:
     """`solve_poses` on NumPy arrays of any length; a frame counts `iterations` on the meter."""
-    poses, residuals = [], []
+    found = []
     for start in range(0, frames.observed.shape[0], CHUNK):
         some, begin = part(frames, state, slice(start, start + CHUNK))
         count = some.observed.shape[0]
-        solved, residual = solve_poses(points, *jax.tree.map(jnp.asarray, padded(some, begin, CHUNK)), iterations)
-        poses.append(jax.tree.map(lambda array, n=count: np.asarray(array)[:n], solved))
-        residuals.append(np.asarray(residual)[:count])
+        chunk = jax.tree.map(jnp.asarray, padded(some, begin, CHUNK))
+        estimate = solve_poses(points, *chunk, jnp.asarray(iterations))
+        found.append(jax.tree.map(lambda array, n=count: np.asarray(array)[:n], estimate))
         meter.add(count * iterations)
-    return jax.tree.map(lambda *arrays: np.concatenate(arrays), *poses), np.concatenate(residuals)
+    return jax.tree.map(lambda *arrays: np.concatenate(arrays), *found)

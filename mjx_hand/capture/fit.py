@@ -17,7 +17,8 @@ from mjx_hand.capture.pose_prior import pose_prior
 from mjx_hand.capture.recording import MarkerRecording
 from mjx_hand.capture.shape_solver import Subject, solve_subject
 from mjx_hand.capture.skinned_points import skinned_points
-from mjx_hand.capture.stages import begin, between_keyframes, drawn_towards, joined, keyframes, smoothed
+from mjx_hand.capture.smoothing import smooth_vectors
+from mjx_hand.capture.stages import begin, between_keyframes, drawn_towards, joined, keyframes
 from mjx_hand.capture.track import Track, make_track, palm_weights
 from mjx_hand.capture.wrist import fill_poses
 from mjx_hand.errors import InputError
@@ -28,7 +29,13 @@ from mjx_hand.pytree import replace
 
 MAX_SHAPE = 10  # coefficients fitted: markers see no more
 KEYFRAMES = 48  # frames from which a recording's shape and skin offsets are taken
-KEYFRAME_STEPS, SUBJECT_STEPS, FRAME_STEPS, SMOOTH_STEPS = 15, 10, 4, 2
+# How many of them count as independent draws from the pose prior. A person's habitual pose is one draw, not 48: counted
+# in full, the prior drags all poses towards its mean and the offsets pay for it (2 mm at the finger tips).
+INDEPENDENT = 2.4
+# How far (m) a marker coordinate is from the model while the shape is the mean one. Believed more, markers fold a
+# joint the wrong way to make up for a bone's length.
+MEAN_SHAPE_DEVIATION = 0.005
+KEYFRAME_STEPS, SUBJECT_STEPS, FRAME_STEPS, SMOOTH_STEPS = 15, 25, 4, 2
 
 
 @dataclass(frozen=True)
@@ -39,15 +46,15 @@ class FitSettings:
         marker_deviation: standard deviation of a marker coordinate about the model, m: noise and moving skin.
         offset_deviation: standard deviation of each component of where a marker was stuck on, m.
         min_visible: markers that a frame must show to be valid.
-        smoothing_time: standard deviation of the Gaussian window over which poses are expected to agree, s.
-        smoothing_deviation: how far (rad) a joint is expected to be from that window's mean.
+        acceleration: standard deviation of the angular acceleration of a finger joint, rad/s^2.
+        smoothing_deviation: how far (rad) a joint is expected to be from the smooth course.
         max_residual: RMS distance (m) of a marker from the fitted hand above which the recording is refused.
     """
 
     marker_deviation: float = 0.001
-    offset_deviation: float = 0.002
+    offset_deviation: float = 0.0015
     min_visible: int = 8
-    smoothing_time: float = 0.03
+    acceleration: float = 50.0
     smoothing_deviation: float = 0.05
     max_residual: float = 0.010
 
@@ -103,16 +110,23 @@ def fit_many(
     mean_subject = Subject(
         shape=jnp.zeros(points.rest_directions.shape[-1]), offsets=jnp.zeros((len(marker_set.names), 3))
     )
-    starts = [begin(track, points, mean_subject, palm, prior, settings.marker_deviation) for track in tracks]
+    starts = [begin(track, points, mean_subject, palm, prior, MEAN_SHAPE_DEVIATION) for track in tracks]
     chosen = [part(frames, state, key) for (frames, state), key in zip(starts, keys, strict=True)]
-    poses, _ = solve_all(points, *joined(chosen), KEYFRAME_STEPS, meter)
+    poses = solve_all(points, *joined(chosen), KEYFRAME_STEPS, meter).state
 
+    deviation = jnp.asarray(settings.offset_deviation)
     subjects, starts = [], []
     bounds = np.cumsum([0, *map(len, keys)])
     for i, (track, key) in enumerate(zip(tracks, keys, strict=True)):
         pose = jax.tree.map(lambda a, i=i: a[bounds[i] : bounds[i + 1]], poses)
-        some = jax.tree.map(jnp.asarray, padded(chosen[i][0], pose, KEYFRAMES))
-        subject, pose = solve_subject(points, *some, mean_subject, settings.offset_deviation, SUBJECT_STEPS)
+        frames = chosen[i][0]
+        weakened = replace(
+            frames,
+            weight=frames.weight * (MEAN_SHAPE_DEVIATION / settings.marker_deviation) ** 2,
+            precision=frames.precision * min(INDEPENDENT / len(key), 1.0),
+        )
+        some = jax.tree.map(jnp.asarray, padded(weakened, pose, KEYFRAMES))
+        subject, pose = solve_subject(points, *some, mean_subject, deviation, jnp.asarray(SUBJECT_STEPS))
         frames, state = begin(track, points, subject, palm, prior, settings.marker_deviation)
         vectors = between_keyframes(track.frames, key, np.asarray(pose.vectors)[: len(key)])
         subjects.append(subject)
@@ -120,22 +134,23 @@ def fit_many(
         meter.add(len(key) * SUBJECT_STEPS)
 
     frames, state = joined(starts)
-    state, _ = solve_all(points, frames, state, FRAME_STEPS, meter)
+    found = solve_all(points, frames, state, FRAME_STEPS, meter)
     bounds = np.cumsum([0, *(len(track.frames) for track in tracks)])
     windows = [slice(a, b) for a, b in itertools.pairwise(bounds)]
-    smooth = [
-        smoothed(state.vectors[at], track.frames, settings.smoothing_time * track.recording.fps)
-        for at, track in zip(windows, tracks, strict=True)
-    ]
+    smooth = []
+    for at, track in zip(windows, tracks, strict=True):
+        jerkiness = settings.acceleration / track.recording.fps**2
+        precision = np.asarray(prior.precision)
+        smooth.append(smooth_vectors(found.state.vectors[at], found.covariance[at], precision, track.frames, jerkiness))
     frames = drawn_towards(frames, np.concatenate(smooth), settings.smoothing_deviation)
-    state, residual = solve_all(points, frames, state, SMOOTH_STEPS, meter)
+    found = solve_all(points, frames, found.state, SMOOTH_STEPS, meter)
 
     out = []
     for at, track, subject in zip(windows, tracks, subjects, strict=True):
-        motion = make_motion(track, jax.tree.map(lambda a, at=at: a[at], state), subject, hand)
+        motion = make_motion(track, jax.tree.map(lambda a, at=at: a[at], found.state), subject, hand)
         offsets = np.asarray(subject.offsets)
         report = make_report(
-            track, residual[at], offsets, marker_set.names, FRAME_STEPS + SMOOTH_STEPS, settings.max_residual
+            track, found.residual[at], offsets, marker_set.names, FRAME_STEPS + SMOOTH_STEPS, settings.max_residual
         )
         out.append((motion, report))
     return out

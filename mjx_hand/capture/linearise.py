@@ -4,6 +4,8 @@ A marker turns about joint j with every link beyond j that it hangs on, so its d
 lever that `skinning weight x (point on that link - joint)` sums to: no automatic differentiation through the chain.
 """
 
+from typing import Any
+
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -18,7 +20,7 @@ NUM_POSE = 6 + 45  # wrist rotation, wrist position, 15 rotation vectors
 
 @pytree
 class PoseState:
-    """The pose of a batch of frames.
+    """The pose of a batch of frames, in JAX arrays on the way through the solver and NumPy arrays outside it.
 
     Attributes:
         vectors: rotation vectors of the 15 joints, rad.
@@ -26,9 +28,9 @@ class PoseState:
         wrist_position: the wrist joint in the world, m.
     """
 
-    vectors: Float[Array, "b 15 3"]
-    wrist_rotation: Float[Array, "b 3 3"]
-    wrist_position: Float[Array, "b 3"]
+    vectors: Float[Any, "b 15 3"]
+    wrist_rotation: Float[Any, "b 3 3"]
+    wrist_position: Float[Any, "b 3"]
 
 
 def left_jacobian(v: Float[Array, "*b 3"]) -> Float[Array, "*b 3 3"]:

@@ -12,7 +12,7 @@ from mjx_hand.rigid.axes import anatomical_axes
 # Degrees, a joint of a finger, knuckle outwards: mean flexion, then the standard deviations of flexion, abduction
 # and rotation about the bone. Flexion is loose, its range is the joint's own. The other two are the off-axis rotation
 # of real recordings (MCP up to 16, PIP 8, DIP 3) taken as two standard deviations; one marker a joint barely sees them.
-FINGER = ((25.0, 40.0, 12.0, 6.0), (30.0, 40.0, 4.0, 4.0), (20.0, 30.0, 1.5, 1.5))
+FINGER = ((25.0, 40.0, 12.0, 8.0), (30.0, 40.0, 4.0, 5.0), (20.0, 30.0, 2.0, 2.0))
 THUMB = ((10.0, 25.0, 20.0, 8.0), (15.0, 25.0, 6.0, 6.0), (15.0, 30.0, 3.0, 3.0))
 
 

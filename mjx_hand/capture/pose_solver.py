@@ -1,12 +1,15 @@
 """Poses of many frames at once: Levenberg-Marquardt on markers and prior, each frame with its own damping."""
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from mjx_hand.capture.linearise import NUM_POSE, PoseState, pose_jacobian, residuals, step_state
+from mjx_hand.capture.normal_blocks import NormalBlocks, damped, joint_covariance, normal_blocks, solve_blocks
 from mjx_hand.capture.skinned_points import SkinnedPoints
-from mjx_hand.pytree import pytree
+from mjx_hand.pytree import pytree, replace
 
 INITIAL_DAMPING = 1e-3  # relative to the diagonal of the normal matrix
 ACCEPTED, REJECTED = 0.2, 8.0  # how the damping changes after a step
@@ -16,7 +19,7 @@ FLOOR = 1e-2
 
 @pytree
 class Frames:
-    """A batch of frames to fit; metres, the world shifted near each frame's markers.
+    """A batch of frames to fit, in JAX or NumPy arrays; metres, the world shifted near each frame's markers.
 
     Attributes:
         observed: marker positions, zero where there is none.
@@ -26,12 +29,12 @@ class Frames:
         mean, precision: normal prior of the rotation vectors.
     """
 
-    observed: Float[Array, "b m 3"]
-    weight: Float[Array, "b m"]
-    rest: Float[Array, "b m 3"]
-    centres: Float[Array, "b 16 3"]
-    mean: Float[Array, "b 15 3"]
-    precision: Float[Array, "15 3 3"]
+    observed: Float[Any, "b m 3"]
+    weight: Float[Any, "b m"]
+    rest: Float[Any, "b m 3"]
+    centres: Float[Any, "b 16 3"]
+    mean: Float[Any, "b 15 3"]
+    precision: Float[Any, "15 3 3"]
 
 
 def energy(frames: Frames, residual: Float[Array, "b m 3"], state: PoseState) -> Float[Array, "b"]:
@@ -43,34 +46,52 @@ def energy(frames: Frames, residual: Float[Array, "b m 3"], state: PoseState) ->
 
 def normal_equations(
     points: SkinnedPoints, frames: Frames, state: PoseState
-) -> tuple[Float[Array, "b 51 51"], Float[Array, "b 51"], Float[Array, "b"], Float[Array, "b m 3 51"]]:
-    """Normal matrix and gradient of the energy's half, the energy, and the markers' derivatives."""
+) -> tuple[NormalBlocks, Float[Array, "b 51"], Float[Array, "b"], Float[Array, "b m 3 51"]]:
+    """Normal matrix and gradient of half the energy, the energy, and the derivatives that made the matrix.
+
+    The skin at a knuckle hangs a little on the fingers beside it. The gradient has that; the matrix, which only
+    steers the step, takes each marker for its main finger's, so that fingers do not couple.
+    """
     residual, jacobian = pose_jacobian(points, frames.rest, frames.centres, state, frames.observed)
-    root = jnp.sqrt(frames.weight)[..., None]
-    rows = (root[..., None] * jacobian).reshape(residual.shape[0], -1, NUM_POSE)
-    normal = jnp.einsum("brp,brq->bpq", rows, rows)
-    gradient = jnp.einsum("brp,br->bp", rows, (root * residual).reshape(residual.shape[0], -1))
-    blocks = jax.scipy.linalg.block_diag(jnp.zeros((6, 6)), *frames.precision)
     pull = jnp.einsum("jac,bjc->bja", frames.precision, state.vectors - frames.mean).reshape(-1, 45)
-    return normal + blocks, gradient.at[:, 6:].add(pull), energy(frames, residual, state), jacobian
+    gradient = jnp.einsum("bmap,bma->bp", jacobian, frames.weight[..., None] * residual).at[:, 6:].add(pull)
+    finger_weight = points.weights[:, 1:].reshape(-1, 5, 3).sum(axis=-1)
+    main = jax.nn.one_hot(jnp.argmax(finger_weight, axis=-1), 5)
+    own = jnp.concatenate([jnp.ones((main.shape[0], 6)), jnp.repeat(main, 9, axis=1)], axis=1)
+    steering = jacobian * own[:, None]
+    rows = jnp.sqrt(frames.weight)[..., None, None] * steering
+    blocks = normal_blocks(rows.reshape(rows.shape[0], -1, NUM_POSE))
+    prior = jax.vmap(lambda finger: jax.scipy.linalg.block_diag(*finger))(frames.precision.reshape(5, 3, 3, 3))
+    return replace(blocks, fingers=blocks.fingers + prior), gradient, energy(frames, residual, state), steering
+
+
+@pytree
+class PoseEstimate:
+    """What the solver found.
+
+    Attributes:
+        state: the poses.
+        residual: predicted less observed markers, m, in the axes of the hand.
+        covariance: posterior covariance of each joint's rotation vector, rad^2.
+    """
+
+    state: PoseState
+    residual: Float[Any, "b m 3"]
+    covariance: Float[Any, "b 15 3 3"]
 
 
 @jax.jit
-def solve_poses(
-    points: SkinnedPoints, frames: Frames, state: PoseState, iterations: int
-) -> tuple[PoseState, Float[Array, "b m 3"]]:
-    """The poses after a fixed number of damped Gauss-Newton steps, and their marker residuals (m, hand axes).
+def solve_poses(points: SkinnedPoints, frames: Frames, state: PoseState, iterations: Int[Array, ""]) -> PoseEstimate:
+    """The poses after a fixed number of damped Gauss-Newton steps.
 
     A frame whose energy a step does not lower stays where it is and is damped more.
     """
 
-    def iterate(_: int, carry: tuple[PoseState, Array]) -> tuple[PoseState, Array]:
+    def iterate(_: Array, carry: tuple[PoseState, Array]) -> tuple[PoseState, Array]:
         state, damping = carry
-        normal, gradient, before, _ = normal_equations(points, frames, state)
-        diagonal = jnp.einsum("bpp->bp", normal)
-        damped = normal + jnp.eye(NUM_POSE) * (damping[:, None] * diagonal + FLOOR)[:, None, :]
-        step = -jax.scipy.linalg.cho_solve(jax.scipy.linalg.cho_factor(damped, lower=True), gradient[..., None])
-        candidate = step_state(state, step[..., 0])
+        normal, gradient, before, _unused = normal_equations(points, frames, state)
+        step = -solve_blocks(damped(normal, damping, FLOOR), gradient[..., None])[..., 0]
+        candidate = step_state(state, step)
         residual = residuals(points, frames.rest, frames.centres, candidate, frames.observed)
         better = energy(frames, residual, candidate) < before
         chosen = jax.tree.map(lambda new, old: jnp.where(_like(better, new), new, old), candidate, state)
@@ -78,7 +99,12 @@ def solve_poses(
 
     damping = jnp.full(frames.observed.shape[0], INITIAL_DAMPING)
     state, _ = jax.lax.fori_loop(0, iterations, iterate, (state, damping))
-    return state, residuals(points, frames.rest, frames.centres, state, frames.observed)
+    normal, _, _, _ = normal_equations(points, frames, state)
+    return PoseEstimate(
+        state=state,
+        residual=residuals(points, frames.rest, frames.centres, state, frames.observed),
+        covariance=joint_covariance(damped(normal, jnp.zeros(normal.wrist.shape[0]), FLOOR)),
+    )
 
 
 def _like(flag: Array, array: Array) -> Array:

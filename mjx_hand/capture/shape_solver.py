@@ -6,10 +6,11 @@ stuck on are shared by all frames, so a few dozen frames that differ determine t
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
-from mjx_hand.capture.linearise import NUM_POSE, PoseState, residuals, step_state
-from mjx_hand.capture.pose_solver import ACCEPTED, INITIAL_DAMPING, REJECTED, Frames, energy, normal_equations
+from mjx_hand.capture.linearise import PoseState, residuals, step_state
+from mjx_hand.capture.normal_blocks import NormalBlocks, damped, solve_blocks
+from mjx_hand.capture.pose_solver import ACCEPTED, FLOOR, INITIAL_DAMPING, REJECTED, Frames, energy, normal_equations
 from mjx_hand.capture.skinned_points import SkinnedPoints, blend_points, shape_points
 from mjx_hand.hand.skinning import link_transforms
 from mjx_hand.pytree import pytree, replace
@@ -45,13 +46,13 @@ def with_subject(points: SkinnedPoints, frames: Frames, subject: Subject) -> Fra
     )
 
 
-def subject_jacobian(
-    points: SkinnedPoints, frames: Frames, vectors: Float[Array, "b 15 3"]
-) -> Float[Array, "b m 3 s+3m"]:
+def subject_jacobian(points: SkinnedPoints, frames: Frames, vectors: Float[Array, "b 15 3"]) -> Float[Array, "b m 3 q"]:
     """Derivative of the markers by shape, then by offsets; exact, both move them linearly."""
     rotations = exp(vectors)
 
     def along(rest: Float[Array, "m 3"], centres: Float[Array, "16 3"]) -> Float[Array, "b m 3"]:
+        rest = jnp.broadcast_to(rest, (len(vectors), *rest.shape))
+        centres = jnp.broadcast_to(centres, (len(vectors), *centres.shape))
         rot, pos = link_transforms(rotations, centres)
         return blend_points(points.weights, rest, centres, rot, pos)
 
@@ -63,9 +64,60 @@ def subject_jacobian(
     return jnp.concatenate([by_shape, by_offset], axis=-1)
 
 
+@pytree
+class JointSystem:
+    """Normal equations of poses and subject together, in the blocks that a Schur complement wants."""
+
+    poses: NormalBlocks
+    pose_gradient: Float[Array, "b 51"]
+    cross: Float[Array, "b 51 q"]
+    shared: Float[Array, "q q"]
+    shared_gradient: Float[Array, "q"]
+
+
+def joint_system(
+    points: SkinnedPoints, frames: Frames, state: PoseState, subject: Subject, prior: Float[Array, "q"]
+) -> JointSystem:
+    """Linearise about poses and subject; `prior` is the precision of shape and offsets."""
+    here = with_subject(points, frames, subject)
+    normal, gradient, _, by_pose = normal_equations(points, here, state)
+    by_subject = subject_jacobian(points, here, state.vectors)
+    residual = residuals(points, here.rest, here.centres, state, here.observed)
+    weighted = here.weight[..., None, None] * by_subject
+    return JointSystem(
+        poses=normal,
+        pose_gradient=gradient,
+        cross=jnp.einsum("bmap,bmaq->bpq", by_pose, weighted),
+        shared=jnp.einsum("bmap,bmaq->pq", by_subject, weighted) + jnp.diag(prior),
+        shared_gradient=jnp.einsum("bmaq,bma->q", weighted, residual) + prior * flat(subject),
+    )
+
+
+def joint_step(system: JointSystem, damping: Float[Array, ""]) -> tuple[Float[Array, "b 51"], Float[Array, "q"]]:
+    """The damped Gauss-Newton step: eliminate each frame's pose, solve for what they share, put it back."""
+    batch = system.cross.shape[0]
+    right = jnp.concatenate([system.cross, system.pose_gradient[..., None]], axis=-1)
+    solved = solve_blocks(damped(system.poses, jnp.full(batch, damping), FLOOR), right)
+    shared = system.shared + damping * jnp.diag(jnp.diag(system.shared))
+    reduced = shared - jnp.einsum("bps,bpt->st", system.cross, solved[..., :-1])
+    gradient = system.shared_gradient - jnp.einsum("bps,bp->s", system.cross, solved[..., -1])
+    shared_step = -jnp.linalg.solve(reduced, gradient)
+    return -solved[..., -1] - jnp.einsum("bps,s->bp", solved[..., :-1], shared_step), shared_step
+
+
+def flat(subject: Subject) -> Float[Array, "q"]:
+    """Shape, then offsets, in one row."""
+    return jnp.concatenate([subject.shape, subject.offsets.ravel()])
+
+
 @jax.jit
 def solve_subject(
-    points: SkinnedPoints, frames: Frames, state: PoseState, subject: Subject, offset_deviation: float, iterations: int
+    points: SkinnedPoints,
+    frames: Frames,
+    state: PoseState,
+    subject: Subject,
+    offset_deviation: Float[Array, ""],
+    iterations: Int[Array, ""],
 ) -> tuple[Subject, PoseState]:
     """Shape, offsets and the poses of `frames`, all of one recording, after a fixed number of damped steps.
 
@@ -80,46 +132,24 @@ def solve_subject(
     num_shape = subject.shape.shape[0]
     prior = jnp.concatenate([jnp.ones(num_shape), jnp.full(subject.offsets.size, offset_deviation**-2)])
 
-    def total(frames: Frames, state: PoseState, subject: Subject) -> Float[Array, ""]:
-        residual = residuals(points, frames.rest, frames.centres, state, frames.observed)
-        shared = jnp.concatenate([subject.shape, subject.offsets.ravel()])
-        return energy(frames, residual, state).sum() + jnp.sum(prior * shared**2)
-
-    def iterate(_: int, carry: tuple[Subject, PoseState, Array]) -> tuple[Subject, PoseState, Array]:
-        subject, state, damping = carry
+    def total(state: PoseState, subject: Subject) -> Float[Array, ""]:
         here = with_subject(points, frames, subject)
-        normal, gradient, _, by_pose = normal_equations(points, here, state)
         residual = residuals(points, here.rest, here.centres, state, here.observed)
-        by_subject = subject_jacobian(points, here, state.vectors)
-        count = by_subject.shape[-1]
-        weighted = (here.weight[..., None, None] * by_subject).reshape(residual.shape[0], -1, count)
-        flat = by_subject.reshape(weighted.shape)
-        cross = jnp.einsum("brp,brs->bps", by_pose.reshape(*weighted.shape[:2], NUM_POSE), weighted)
-        shared = jnp.concatenate([subject.shape, subject.offsets.ravel()])
-        shared_gradient = jnp.einsum("brs,br->s", weighted, residual.reshape(residual.shape[0], -1)) + prior * shared
-        shared_normal = jnp.einsum("brs,brt->st", weighted, flat) + jnp.diag(prior)
-        shared_normal += damping * jnp.diag(jnp.diag(shared_normal))
-        diagonal = jnp.einsum("bpp->bp", normal)
-        damped = normal + jnp.eye(NUM_POSE) * (damping * diagonal + 1e-2)[:, None, :]
-        factor = jax.scipy.linalg.cho_factor(damped, lower=True)
-        # Eliminate each frame's pose, solve for what they share, and put it back.
-        solved = jax.scipy.linalg.cho_solve(factor, jnp.concatenate([cross, gradient[..., None]], axis=-1))
-        reduced = shared_normal - jnp.einsum("bps,bpt->st", cross, solved[..., :-1])
-        right = shared_gradient - jnp.einsum("bps,bp->s", cross, solved[..., -1])
-        shared_step = -jnp.linalg.solve(reduced, right)
-        pose_step = -solved[..., -1] - jnp.einsum("bps,s->bp", solved[..., :-1], shared_step)
+        return energy(here, residual, state).sum() + jnp.sum(prior * flat(subject) ** 2)
+
+    def iterate(_: Array, carry: tuple[Subject, PoseState, Array]) -> tuple[Subject, PoseState, Array]:
+        subject, state, damping = carry
+        pose_step, shared_step = joint_step(joint_system(points, frames, state, subject, prior), damping)
         moved = Subject(
             shape=subject.shape + shared_step[:num_shape],
             offsets=subject.offsets + shared_step[num_shape:].reshape(-1, 3),
         )
         candidate = step_state(state, pose_step)
-        better = total(with_subject(points, frames, moved), candidate, moved) < total(here, state, subject)
-        choose = lambda new, old: jnp.where(better, new, old)  # noqa: E731
-        return (
-            jax.tree.map(choose, moved, subject),
-            jax.tree.map(choose, candidate, state),
-            damping * jnp.where(better, ACCEPTED, REJECTED),
+        better = total(candidate, moved) < total(state, subject)
+        subject, state = jax.tree.map(
+            lambda new, old: jnp.where(better, new, old), (moved, candidate), (subject, state)
         )
+        return subject, state, damping * jnp.where(better, ACCEPTED, REJECTED)
 
     subject, state, _ = jax.lax.fori_loop(0, iterations, iterate, (subject, state, jnp.array(INITIAL_DAMPING)))
     return subject, state

@@ -139,7 +139,7 @@ def marker_chunk(
     offset: Float[Array, "m 3"],
 ) -> Float[Array, "b m 3"]:
     """Markers of a chunk of frames: the skin about each marker, its normal and its tangents."""
-    rest, centres = shape_points(points, shape)
+    rest, centres = shape_points(points, jnp.broadcast_to(shape, (rotations.shape[0], *shape.shape)))
     skin = pose_points(points, rest, centres, rotations)
     triangles = skin[:, corners]
     edge1 = triangles[..., 1, :] - triangles[..., 0, :]

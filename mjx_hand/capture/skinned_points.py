@@ -83,7 +83,7 @@ def blend_points(
     link_rotation: Float[Array, "*b 16 3 3"],
     link_position: Float[Array, "*b 16 3"],
 ) -> Float[Array, "*b p 3"]:
-    """Linear blend skinning of rest points (m), relative to the wrist joint; linear in `rest` and `centres` together."""
+    """Linear blend skinning of rest points (m), relative to the wrist; linear in `rest` and `centres` together."""
     offset = link_position - jnp.einsum("...jab,...jb->...ja", link_rotation, centres) - link_position[..., :1, :]
     blended = jnp.einsum("pj,...jab->...pab", weights, link_rotation)
     return jnp.einsum("...pab,...pb->...pa", blended, rest) + jnp.einsum("pj,...ja->...pa", weights, offset)

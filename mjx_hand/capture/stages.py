@@ -1,9 +1,10 @@
 """What lies between the solver's passes over a recording: first guesses, key frames, smoothing."""
 
+import itertools
+
 import jax
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.ndimage import gaussian_filter1d
 
 from mjx_hand.capture.linearise import PoseState
 from mjx_hand.capture.pose_prior import PosePrior
@@ -47,8 +48,10 @@ def begin(
 
 
 def keyframes(track: Track, count: int) -> Int[Array, "k"]:
-    """Up to `count` of a track's frames, evenly spread over it."""
-    return np.unique(np.linspace(0, len(track.frames) - 1, count).round().astype(int))
+    """Up to `count` of a track's frames, spread over it: of each stretch the frame that shows most markers."""
+    shown = track.visible.sum(axis=1)
+    edges = np.unique(np.linspace(0, len(shown), count + 1).round().astype(int))
+    return np.array([start + np.argmax(shown[start:stop]) for start, stop in itertools.pairwise(edges)])
 
 
 def between_keyframes(
@@ -58,17 +61,6 @@ def between_keyframes(
     before, after, fraction = interpolation_index(frames[key].astype(float), frames.astype(float))
     step = fraction[:, None, None].astype(np.float32)
     return (1 - step) * vectors[before] + step * vectors[after]
-
-
-def smoothed(vectors: Float[Array, "b 15 3"], frames: Int[Array, "b"], deviation: float) -> Float[Array, "b 15 3"]:
-    """Rotation vectors averaged over a Gaussian window of `deviation` frames; missing frames count for nothing."""
-    span = np.zeros((frames[-1] - frames[0] + 1, 1, 1))
-    span[frames - frames[0]] = 1.0
-    values = np.zeros((len(span), *vectors.shape[1:]))
-    values[frames - frames[0]] = vectors
-    blur = gaussian_filter1d(values, deviation, axis=0, mode="constant")
-    mass = gaussian_filter1d(span, deviation, axis=0, mode="constant")
-    return (blur[frames - frames[0]] / mass[frames - frames[0]]).astype(np.float32)
 
 
 def drawn_towards(frames: Frames, vectors: Float[Array, "b 15 3"], deviation: float) -> Frames:

@@ -22,7 +22,9 @@ def interpolation_index(
     return before, after, np.clip((query - times[before]) / span, 0.0, 1.0)
 
 
-def slerp(a: Float[Array, "*b 3 3"], b: Float[Array, "*b 3 3"], fraction: Float[Array, "*b"]) -> Float[Array, "*b 3 3"]:
+def slerp(
+    a: Float[Array, "*#b 3 3"], b: Float[Array, "*#b 3 3"], fraction: Float[Array, "*#b"]
+) -> Float[Array, "*c 3 3"]:
     """The rotation `fraction` of the great arc from a to b; the three broadcast."""
     shape = np.broadcast_shapes(a.shape[:-2], b.shape[:-2], np.shape(fraction))
     first = Rotation.from_matrix(np.broadcast_to(a, (*shape, 3, 3)).reshape(-1, 3, 3))
