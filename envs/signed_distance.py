@@ -25,6 +25,15 @@ def signed_distance(kind: str, size: Float[Array, "*b 3"], point: Float[Array, "
     raise InputError(f"object kind {kind!r} is not known; valid: box, sphere, cylinder")
 
 
+def half_extents(kind: str, size: Float[Array, "*b 3"]) -> Float[Array, "*b 3"]:
+    """Half extents (m) of the object's bounding box in its own frame."""
+    if kind == "sphere":
+        return jnp.stack([size[..., 0]] * 3, axis=-1)
+    if kind == "cylinder":
+        return jnp.stack([size[..., 0], size[..., 0], size[..., 1]], axis=-1)
+    return jnp.asarray(size)
+
+
 def _norm(v: Float[Array, "*b n"]) -> Float[Array, "*b"]:
     return jnp.sqrt(jnp.sum(v * v, axis=-1) + 1e-14)  # the constant keeps the gradient at the centre finite
 

@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 from scipy.optimize import nnls
 
 from envs.grasps import GraspType
-from envs.signed_distance import signed_distance
+from envs.signed_distance import half_extents, signed_distance
 from mjx_hand.hand.joints import LINKS, NUM_HINGES
 from mjx_hand.pytree import pytree
 from mjx_hand.rigid.gains import Gains
@@ -19,6 +19,7 @@ from mjx_hand.rotations import exp
 
 _STEPS = 60
 _ALONG = jnp.linspace(0.0, 1.0, 4)  # where along each capsule's axis distances are taken
+_OPENING_DAMPING = 0.01  # m/rad
 # What one unit of residual is worth (m, rad).
 _TOUCH, _SLIDE, _CLEAR, _SWAY, _TILT = 0.0005, 0.004, 0.001, 0.5, 0.3
 
@@ -64,6 +65,17 @@ def squeeze_angles(grasp: GraspType, posture: Posture, gains: Gains) -> Float[np
     return np.clip(torque, -gains.force_limit, gains.force_limit) / gains.stiffness
 
 
+def opening_angles(grasp: GraspType, posture: Posture) -> Float[np.ndarray, "20"]:
+    """Hinge offsets (rad) that take each contact `grasp.opening` metres straight off its face: damped least squares.
+
+    Fingers that leave, and so arrive, along the face's normal touch without pushing the object aside.
+    """
+    normals = np.array([contact.normal for contact in grasp.contacts])
+    jacobian = np.asarray(posture.contact_jacobian).reshape(-1, NUM_HINGES)
+    square = jacobian @ jacobian.T + _OPENING_DAMPING**2 * np.eye(len(jacobian))
+    return jacobian.T @ np.linalg.solve(square, grasp.opening * normals.ravel())
+
+
 @partial(jax.jit, static_argnums=0)
 def _solve_all(grasp: GraspType, hands: RigidHand, sizes: Array) -> Posture:
     return jax.vmap(partial(_solve, grasp))(hands, sizes)
@@ -79,7 +91,7 @@ def _solve(grasp: GraspType, hand: RigidHand, size: Array) -> Posture:
     radius = hand.capsule_radius
     slack = jnp.full(len(capsule_links), 0.001).at[jnp.array(capsules)].set(-0.0003)
     support = jnp.array(grasp.support)
-    below = jnp.array([0.0, 0.0, -_half_height(grasp.object_kind, size) - support[2]])  # the block's centre
+    below = jnp.array([0.0, 0.0, -half_extents(grasp.object_kind, size)[2] - support[2]])  # the block's centre
 
     def axis_points(x: Array) -> Array:
         """World points on the capsules' axes, (capsules, along, 3)."""
@@ -95,7 +107,7 @@ def _solve(grasp: GraspType, hand: RigidHand, size: Array) -> Posture:
         return points[:, 0] + along[:, None] * (points[:, -1] - points[:, 0])
 
     def touch(x: Array) -> Array:
-        target = normals * (jnp.abs(normals) @ _extent(grasp.object_kind, size))[:, None] + aside
+        target = normals * (jnp.abs(normals) @ half_extents(grasp.object_kind, size))[:, None] + aside
         target += normals * radius[jnp.array(capsules)][:, None]
         return contacts(x) - target
 
@@ -162,14 +174,3 @@ def _rotation(x: Array, seed: Array) -> Array:
 
 def _last_capsule(link: str, capsule_links: tuple[int, ...]) -> int:
     return max(k for k, owner in enumerate(capsule_links) if LINKS[owner] == link)
-
-
-def _extent(kind: str, size: Array) -> Array:
-    """Half extents of the object's bounding box."""
-    if kind == "sphere":
-        return jnp.broadcast_to(size[0], (3,))
-    return jnp.array([size[0], size[0], size[1]]) if kind == "cylinder" else size
-
-
-def _half_height(kind: str, size: Array) -> Array:
-    return _extent(kind, size)[2]

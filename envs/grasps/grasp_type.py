@@ -40,7 +40,7 @@ class GraspType:
         support: half extents of the block that the object stands on.
         contacts: what touches where; the first opposes the rest.
         posture: seed for the closed posture, hinge angles in the order of `hand.joints.HINGES`.
-        opening: how much of the posture's flexion is taken back before the grasp, for each hinge kind.
+        opening: how far off its face each contact starts (m).
         wrist_rotation: seed for the hand's orientation, rows of world_from_hand.
         approach: where the wrist comes from, relative to the grasp (world frame).
         squeeze: force of the first contact (N), balanced by the others.

@@ -22,7 +22,7 @@ GRASP = GraspType(
         *(0.00, 0.25, 0.27, 0.27),
         *(-0.04, 0.58, 0.05, -0.04),
     ),
-    opening=0.35,
+    opening=0.015,
     # palm down, fingers along world +x and tilted 35 degrees towards the table
     wrist_rotation=((-0.819, 0.574, 0.0), (0.0, 0.0, 1.0), (0.574, 0.819, 0.0)),
     approach=(-0.03, 0.0, 0.07),

@@ -34,15 +34,20 @@ DIVERGED = [
 
 
 def make(models: Sequence[mujoco.MjModel], substeps: int) -> "NativeEngine":
-    """The engine with the settings that held best in the solver sweep (Newton stops early, so the caps are cheap)."""
-    tuned = [copy.copy(model) for model in models]
-    for model in tuned:
+    """The engine over copies of the models with its own solver settings."""
+    return NativeEngine(tuned(models), substeps)
+
+
+def tuned(models: Sequence[mujoco.MjModel]) -> list[mujoco.MjModel]:
+    """Copies with the settings that held best in the solver sweep (Newton stops early, so the caps are cheap)."""
+    copies = [copy.copy(model) for model in models]
+    for model in copies:
         model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
         model.opt.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
         model.opt.impratio = 10.0
         model.opt.iterations = 10
         model.opt.ls_iterations = 20
-    return NativeEngine(tuned, substeps)
+    return copies
 
 
 class NativeEngine:

@@ -1,0 +1,183 @@
+"""Simulated capture of performed trials: recorded with markers, noise and gaps, fitted, projected; truth kept beside.
+
+What comes out is what a laboratory would have: the twin never sees the true angles, shape or contact forces.
+"""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation
+
+from envs.demonstrations.trials import Trial
+from envs.scene import TIMESTEP
+from mjx_hand.capture.fit import fit_many
+from mjx_hand.capture.marker_set import included_marker_set
+from mjx_hand.capture.off_axis import add_off_axis_rotation
+from mjx_hand.capture.simulate import simulate_markers
+from mjx_hand.hand.model import HandModel
+from mjx_hand.motion.archive import load_arrays, save_arrays
+from mjx_hand.motion.demonstration import Demonstration
+from mjx_hand.motion.motion import Motion
+from mjx_hand.motion.resample import matrix_quaternions, resample_motion
+from mjx_hand.motion.smooth import CUTOFF, low_pass, smooth_rows
+from mjx_hand.retarget.sequence import retarget_sequence
+from mjx_hand.rigid.build import build_rigid_hand
+from mjx_hand.rigid.rigid_hand import RigidHand, joint_rotations
+
+TRUTH_SCHEMA = "mjx-hand/truth/1"
+
+
+@dataclasses.dataclass(frozen=True)
+class CaptureSettings:
+    """How trials are recorded.
+
+    Attributes:
+        fps: of the marker system, 1/s.
+        marker_noise: standard deviation of each marker coordinate, m.
+        gap_fraction: share of frames in which a marker is hidden.
+        off_axis: rotations that hinges cannot follow, as a share of what real recordings show.
+        object_noise: standard deviation of the object's measured position, m; of its orientation, ten times as many rad.
+        rate: of the demonstrations made from the recordings, 1/s.
+        cutoff: of the low-pass filter on their angles and poses, Hz.
+    """
+
+    fps: float = 120.0
+    marker_noise: float = 0.0005
+    gap_fraction: float = 0.05
+    off_axis: float = 0.3
+    object_noise: float = 0.0002
+    rate: float = 50.0
+    cutoff: float = CUTOFF
+
+
+@dataclasses.dataclass(frozen=True)
+class Truth:
+    """What really happened in a demonstration, at its own rate; metres, radians, wxyz.
+
+    Attributes:
+        angles: the hinge angles that the performing hand had (before off-axis rotation was added).
+        wrist_position, wrist_quaternion: its wrist.
+        object_pose: the object.
+        shape: its shape coefficients.
+    """
+
+    angles: Float[np.ndarray, "t 20"]
+    wrist_position: Float[np.ndarray, "t 3"]
+    wrist_quaternion: Float[np.ndarray, "t 4"]
+    object_pose: Float[np.ndarray, "t 7"]
+    shape: Float[np.ndarray, "s"]
+
+
+def record_trials(
+    trials: Sequence[Trial],
+    hands: Sequence[RigidHand],
+    shapes: Float[np.ndarray, "p s"],
+    model: HandModel,
+    support: Float[np.ndarray, "3"],
+    grasp: str,
+    seed: int,
+    settings: CaptureSettings | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> list[tuple[Demonstration, Truth]]:
+    """Record, fit and project each trial.
+
+    Args:
+        trials: what was performed.
+        hands, shapes: the true hand and its shape coefficients, by person.
+        model: the hand model that both the people and the fit use.
+        support: half extents of the block the object stood on.
+        grasp: name of the grasp type.
+        seed: of noise, gaps and off-axis rotations.
+        settings: of the capture system.
+        progress: told the share of the fitting done.
+    """
+    settings = CaptureSettings() if settings is None else settings
+    markers = included_marker_set(model)
+    seeds = np.random.SeedSequence(seed).generate_state(3 * len(trials)).reshape(-1, 3).tolist()
+    recordings = []
+    for k, trial in enumerate(trials):
+        motion = _true_motion(trial, hands[trial.person], shapes[trial.person], model, settings, seeds[k][0])
+        recordings.append(
+            simulate_markers(
+                model,
+                motion,
+                markers,
+                seeds[k][1],
+                noise=settings.marker_noise,
+                gap_fraction=settings.gap_fraction,
+            )
+        )
+    out = []
+    for k, (motion, _) in enumerate(fit_many(recordings, model, markers, progress=progress)):
+        trial, fitted = trials[k], resample_motion(motion, settings.rate)
+        twin = build_rigid_hand(model, fitted.shape)
+        joints = low_pass(retarget_sequence(fitted, twin), settings.cutoff)
+        truth = _truth(trial, shapes[trial.person], joints.num_frames, settings.rate)
+        source = f"simulated {grasp}, person {trial.person}, seed {seed}.{k}"
+        demonstration = Demonstration(
+            motion=dataclasses.replace(joints, source=source),
+            object_pose=_measured(truth.object_pose, settings, seeds[k][2]),
+            object=trial.object,
+            support=support,
+            support_position=trial.support_position,
+            shape=fitted.shape,
+            grasp=grasp,
+            source=source,
+        )
+        out.append((demonstration, truth))
+    return out
+
+
+def _true_motion(
+    trial: Trial, hand: RigidHand, shape: np.ndarray, model: HandModel, settings: CaptureSettings, seed: int
+) -> Motion:
+    """The trial as the moving skin that a marker system sees, off-axis rotations added."""
+    frames = len(trial.angles)
+    moved = Motion(
+        fps=1 / TIMESTEP,
+        rotations=np.asarray(joint_rotations(trial.angles.astype(np.float32), hand), np.float64),
+        wrist_position=trial.wrist_position,
+        wrist_quaternion=Rotation.from_matrix(trial.wrist_rotation).as_quat(scalar_first=True),
+        shape=shape,
+        valid=np.ones(frames, bool),
+        side=model.side,
+        source="performed trial",
+    )
+    moved = resample_motion(moved, settings.fps)
+    rotations = add_off_axis_rotation(moved.rotations, seed, settings.off_axis, settings.fps)
+    return dataclasses.replace(moved, rotations=rotations)
+
+
+def _truth(trial: Trial, shape: np.ndarray, frames: int, rate: float) -> Truth:
+    rows = np.minimum(np.round(np.arange(frames) / rate / TIMESTEP).astype(int), len(trial.angles) - 1)
+    return Truth(
+        angles=trial.angles[rows],
+        wrist_position=trial.wrist_position[rows],
+        wrist_quaternion=Rotation.from_matrix(trial.wrist_rotation[rows]).as_quat(scalar_first=True),
+        object_pose=trial.object_pose[rows],
+        shape=shape,
+    )
+
+
+def _measured(pose: Float[np.ndarray, "t 7"], settings: CaptureSettings, seed: int) -> Float[np.ndarray, "t 7"]:
+    """The object's pose as measured: with noise, then filtered as the hand's is."""
+    rng = np.random.default_rng(seed)
+    position = pose[:, :3] + rng.normal(scale=settings.object_noise, size=(len(pose), 3))
+    turn = Rotation.from_rotvec(rng.normal(scale=settings.object_noise * 10, size=(len(pose), 3)))
+    quaternion = matrix_quaternions((turn * Rotation.from_quat(pose[:, 3:], scalar_first=True)).as_matrix())
+    rows = smooth_rows(np.concatenate([position, quaternion], axis=1), settings.rate, settings.cutoff)
+    rows[:, 3:] /= np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
+    return rows
+
+
+def save_truth(truth: Truth, path: str | Path) -> None:
+    """Write as `.npz` (schema mjx-hand/truth/1)."""
+    save_arrays(path, TRUTH_SCHEMA, dataclasses.asdict(truth))
+
+
+def load_truth(path: str | Path) -> Truth:
+    """Read what `save_truth` wrote."""
+    return Truth(**load_arrays(path, TRUTH_SCHEMA))

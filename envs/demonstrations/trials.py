@@ -1,0 +1,185 @@
+"""Trials: random scripted grasps of a type, by several people, performed in the engine until enough succeed."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import jax
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from envs.demonstrations.perform import Performance, perform
+from envs.demonstrations.posture import Posture, opening_angles, solve_postures, squeeze_angles
+from envs.demonstrations.script import GraspMotion, Tempo, scripted_targets
+from envs.grasps import GraspType
+from envs.physics.native import tuned
+from envs.scene import TIMESTEP, scene_model, wrist_coordinates
+from envs.signed_distance import half_extents
+from mjx_hand.errors import InputError
+from mjx_hand.motion.demonstration import ObjectDescription
+from mjx_hand.rigid.gains import Gains
+from mjx_hand.rigid.rigid_hand import RigidHand
+
+_ROUNDS = 6  # batches of attempts before giving up
+_TOUCH_LIMIT = 0.002  # m: a posture whose contacts miss by more is not tried
+
+
+@dataclasses.dataclass(frozen=True)
+class Trial:
+    """One grasp that was performed and held; metres, radians, wxyz, at the physics rate.
+
+    Attributes:
+        person: index of the hand that did it.
+        object: what was grasped.
+        support_position: centre of the block that it stood on.
+        angles, wrist_position, wrist_rotation, object_pose: as in `Performance`, one trial's.
+    """
+
+    person: int
+    object: ObjectDescription
+    support_position: Float[np.ndarray, "3"]
+    angles: Float[np.ndarray, "t 20"]
+    wrist_position: Float[np.ndarray, "t 3"]
+    wrist_rotation: Float[np.ndarray, "t 3 3"]
+    object_pose: Float[np.ndarray, "t 7"]
+
+
+def perform_trials(
+    grasp: GraspType,
+    hands: Sequence[RigidHand],
+    per_person: int,
+    seed: int,
+    report: Callable[[int, int], None] = lambda kept, tried: None,
+) -> list[Trial]:
+    """`per_person` successful trials of each hand, in the order of the hands.
+
+    Args:
+        grasp: the type.
+        hands: the people's true hands.
+        per_person: how many of each.
+        seed: of every random draw.
+        report: called after each batch with the trials kept and tried so far.
+
+    Raises:
+        InputError: after several batches some hand has not succeeded often enough.
+    """
+    rng = np.random.default_rng(seed)
+    kept: dict[int, list[Trial]] = {person: [] for person in range(len(hands))}
+    tried = 0
+    for _ in range(_ROUNDS):
+        missing = [p for p, trials in kept.items() for _ in range(per_person - len(trials))]
+        if not missing:
+            break
+        # A fixed batch size, so that the posture solver compiles once: fill up with spare attempts of the same people.
+        size = -(-len(hands) * per_person * 5 // 4)
+        people = [missing[k % len(missing)] for k in range(size)]
+        for trial in _attempt(grasp, [hands[p] for p in people], people, rng):
+            if len(kept[trial.person]) < per_person:
+                kept[trial.person].append(trial)
+        tried += size
+        report(sum(map(len, kept.values())), tried)
+    short = [p for p, trials in kept.items() if len(trials) < per_person]
+    if short:
+        raise InputError(
+            f"grasp {grasp.name!r}: hands {short} held fewer than {per_person} objects in {tried} attempts; "
+            "use other shapes, smaller objects, or mend the type's posture"
+        )
+    return [trial for trials in kept.values() for trial in trials]
+
+
+def _attempt(
+    grasp: GraspType, hands: Sequence[RigidHand], people: Sequence[int], rng: np.random.Generator
+) -> list[Trial]:
+    """One batch of random trials; those that held."""
+    things = [_draw_object(grasp, rng) for _ in hands]
+    solved = solve_postures(grasp, hands, np.stack([thing.size for thing in things]))
+    postures = [jax.tree.map(lambda leaf, k=k: np.asarray(leaf[k], float), solved) for k in range(len(hands))]
+    good = [k for k, posture in enumerate(postures) if posture.touch_error < _TOUCH_LIMIT]
+    if not good:
+        return []
+    gains = Gains()
+    motions, models, starts, supports = [], [], [], []
+    for k in good:
+        centre = np.array([0.0, 0.0, 2 * grasp.support[2] + half_extents(things[k].kind, things[k].size)[2]])
+        supports.append(np.array([0.0, 0.0, grasp.support[2]]))
+        starts.append(np.concatenate([centre, [1.0, 0.0, 0.0, 0.0]]))
+        motions.append(_draw_motion(grasp, postures[k], centre, hands[k], gains, rng))
+        support = np.array(grasp.support)
+        models.append(scene_model(hands[k], things[k], support, supports[-1], postures[k].rotation, gains=gains))
+    bases = np.stack([postures[k].rotation for k in good])
+    done = perform(
+        tuned(models),
+        bases,
+        _controls(motions, bases, models[0]),
+        np.stack(starts),
+        np.array([motion.tempo.end("lift") for motion in motions]),
+    )
+    return [
+        _trial(done, row, people[k], things[k], supports[row], motions[row].tempo)
+        for row, k in enumerate(good)
+        if done.held[row]
+    ]
+
+
+def _trial(
+    done: Performance, row: int, person: int, thing: ObjectDescription, support: np.ndarray, tempo: Tempo
+) -> Trial:
+    steps = round(tempo.duration / TIMESTEP)
+    return Trial(
+        person=person,
+        object=thing,
+        support_position=support,
+        angles=done.angles[row, :steps],
+        wrist_position=done.wrist_position[row, :steps],
+        wrist_rotation=done.wrist_rotation[row, :steps],
+        object_pose=done.object_pose[row, :steps],
+    )
+
+
+def _draw_object(grasp: GraspType, rng: np.random.Generator) -> ObjectDescription:
+    low, high = map(np.array, grasp.object_size)
+    return ObjectDescription(
+        kind=grasp.object_kind,
+        size=low + rng.uniform() * (high - low),
+        mass=float(rng.uniform(*grasp.object_mass)),
+        friction=float(rng.uniform(*grasp.object_friction)),
+    )
+
+
+def _draw_motion(
+    grasp: GraspType,
+    posture: Posture,
+    centre: Float[np.ndarray, "3"],
+    hand: RigidHand,
+    gains: Gains,
+    rng: np.random.Generator,
+) -> GraspMotion:
+    closed = np.asarray(posture.angles)
+    opened = np.clip(closed + opening_angles(grasp, posture), hand.hinge_lower, hand.hinge_upper)
+    heading = rng.uniform(0, 2 * np.pi)
+    way = rng.uniform(*grasp.carry)
+    axis = rng.normal(size=3)
+    return GraspMotion(
+        open_angles=opened,
+        closed_angles=closed,
+        squeeze_angles=squeeze_angles(grasp, posture, gains),
+        position=centre + np.asarray(posture.position),
+        rotation=np.asarray(posture.rotation),
+        approach=np.array(grasp.approach) + rng.uniform(-0.005, 0.005, 3),
+        travel=np.array([way * np.cos(heading), way * np.sin(heading), rng.uniform(*grasp.lift)]),
+        turn=axis / np.linalg.norm(axis) * rng.uniform(*grasp.turn),
+        tempo=Tempo(approach=rng.uniform(0.7, 0.9), close=rng.uniform(0.5, 0.9), lift=rng.uniform(0.8, 1.1)),
+    )
+
+
+def _controls(
+    motions: Sequence[GraspMotion], bases: Float[np.ndarray, "n 3 3"], model: mujoco.MjModel
+) -> Float[np.ndarray, "n t 26"]:
+    """Targets at the physics rate, all as long as the longest script (the shorter ones hold their last)."""
+    time = np.arange(round(max(motion.tempo.duration for motion in motions) / TIMESTEP)) * TIMESTEP
+    rows = []
+    for motion, base in zip(motions, bases, strict=True):
+        angles, position, quaternion = scripted_targets(motion, time)
+        rows.append(np.concatenate([wrist_coordinates(position, quaternion, base), angles], axis=1))
+    low, high = model.actuator_ctrlrange.T
+    return np.clip(np.stack(rows), low, high)

@@ -1,0 +1,124 @@
+"""`Reference`: a set of demonstrations as arrays that an environment can index inside jit."""
+
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+from scipy.spatial.transform import Rotation
+
+from envs.grip import grip_offsets
+from envs.scene import NUM_WRIST, base_rotation, wrist_coordinates
+from mjx_hand.errors import InputError
+from mjx_hand.motion.demonstration import Demonstration
+from mjx_hand.pytree import pytree
+from mjx_hand.rigid.gains import Gains
+from mjx_hand.rigid.rigid_hand import RigidHand, stack_hands
+
+
+@pytree
+class Reference:
+    """d demonstrations, padded to t frames by holding their last; metres, radians, quaternions wxyz.
+
+    Attributes:
+        targets: the wrist's slides and turns, and the hinge angles, as demonstrated.
+        controls: what to command so that the controllers are at each target when its frame comes.
+        grip: what reference-state initialisation adds to them, within the residual's reach.
+        object_pose: in the world.
+        base: world_from_base of each scene's wrist.
+        features: object size (m), mass (kg) and friction.
+        length: frames of each demonstration.
+    """
+
+    targets: Float[Array, "d t 26"]
+    controls: Float[Array, "d t 26"]
+    grip: Float[Array, "d t 26"]
+    object_pose: Float[Array, "d t 7"]
+    base: Float[Array, "d 3 3"]
+    features: Float[Array, "d 5"]
+    length: Int[Array, "d"]
+
+
+def make_reference(
+    demonstrations: Sequence[Demonstration],
+    hands: Sequence[RigidHand],
+    *,
+    grip_force: float,
+    grip_reach: float,
+    gains: Gains,
+) -> Reference:
+    """Stack demonstrations and work out their grip offsets.
+
+    Raises:
+        InputError: none given, several rates, or several kinds of object (one model family has one kind).
+    """
+    _check(demonstrations)
+    frames = max(d.num_frames for d in demonstrations)
+    targets, poses, bases, relative = [], [], [], []
+    for d in demonstrations:
+        base = base_rotation(d)
+        wrist = wrist_coordinates(d.motion.wrist_position, d.motion.wrist_quaternion, base)
+        targets.append(_padded(np.concatenate([wrist, d.motion.angles], axis=1), frames))
+        poses.append(_padded(d.object_pose, frames))
+        bases.append(base)
+        hand = Rotation.from_quat(_padded(d.motion.wrist_quaternion, frames), scalar_first=True)
+        thing = Rotation.from_quat(poses[-1][:, 3:], scalar_first=True)
+        offset = poses[-1][:, :3] - _padded(d.motion.wrist_position, frames)
+        relative.append(((hand.inv() * thing).as_matrix(), hand.inv().apply(offset)))
+    kind = demonstrations[0].object.kind
+    sizes = jnp.asarray(np.stack([d.object.size for d in demonstrations]), jnp.float32)
+    targets = jnp.asarray(np.stack(targets), jnp.float32)
+    rotation = jnp.asarray(np.stack([r for r, _ in relative]), jnp.float32)
+    position = jnp.asarray(np.stack([p for _, p in relative]), jnp.float32)
+
+    @jax.jit
+    def grips(angles: Array, rotation: Array, position: Array, hands: RigidHand, sizes: Array) -> Array:
+        def one(a: Array, r: Array, p: Array, hand: RigidHand, size: Array) -> Array:
+            return grip_offsets(a, (r, p), hand, kind, size, grip_force, gains)
+
+        return jax.vmap(one)(angles, rotation, position, hands, sizes)
+
+    grip = grips(targets[..., NUM_WRIST:], rotation, position, stack_hands(hands), sizes)
+    grip = jnp.clip(grip, -grip_reach, grip_reach)
+    features = [[*d.object.size, d.object.mass, d.object.friction] for d in demonstrations]
+    return Reference(
+        targets=targets,
+        controls=_anticipated(targets, gains, demonstrations[0].motion.fps),
+        grip=jnp.concatenate([jnp.zeros((*grip.shape[:2], NUM_WRIST)), grip], axis=-1),
+        object_pose=jnp.asarray(np.stack(poses), jnp.float32),
+        base=jnp.asarray(np.stack(bases), jnp.float32),
+        features=jnp.asarray(features, jnp.float32),
+        length=jnp.array([d.num_frames for d in demonstrations]),
+    )
+
+
+def _anticipated(targets: Float[Array, "d t 26"], gains: Gains, fps: float) -> Float[Array, "d t 26"]:
+    """Targets led by the controllers' lag times the targets' speed.
+
+    A position controller with damping follows a moving target kv/kp seconds late. A frame's target is commanded for the
+    whole step that ends at that frame, half a step early on average, which makes up for part of it.
+    """
+    kp = np.concatenate([[gains.wrist_slide[0]] * 3, [gains.wrist_turn[0]] * 3, gains.stiffness])
+    kv = np.concatenate([[gains.wrist_slide[1]] * 3, [gains.wrist_turn[1]] * 3, gains.damping])
+    speed = jnp.gradient(targets, 1 / fps, axis=1)
+    return targets + jnp.asarray(kv / kp - 0.5 / fps, jnp.float32) * speed
+
+
+def _padded(rows: np.ndarray, frames: int) -> np.ndarray:
+    return np.concatenate([rows, np.repeat(rows[-1:], frames - len(rows), axis=0)])
+
+
+def _check(demonstrations: Sequence[Demonstration]) -> None:
+    if not demonstrations:
+        raise InputError("no demonstrations given; make a set with: python -m envs.demonstrations config=pinch")
+    for what, values in (
+        ("frame rates", {round(d.motion.fps, 6) for d in demonstrations}),
+        ("kinds of object", {d.object.kind for d in demonstrations}),
+        ("sides", {d.motion.side for d in demonstrations}),
+    ):
+        if len(values) > 1:
+            raise InputError(
+                f"demonstrations of several {what} ({', '.join(map(str, sorted(values)))}) in one set; "
+                "an environment runs one"
+            )

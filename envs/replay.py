@@ -1,0 +1,73 @@
+"""Assisted replay: each demonstration rolled out once with grip offsets while the object is carried along its reference.
+
+Its states are where training episodes may start (reference-state initialisation): consistent in the physics, because the
+hand really moved there under its controller and really presses on the object.
+"""
+
+import copy
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+from mujoco import batch
+from scipy.spatial.transform import Rotation
+
+from envs.reference import Reference
+from envs.scene import NUM_WRIST, OBJECT
+from mjx_hand.hand.joints import NUM_HINGES
+
+_NUM_TARGETS = NUM_WRIST + NUM_HINGES
+_HEAVIER = 300.0
+
+
+def assisted_replay(
+    models: Sequence[mujoco.MjModel], reference: Reference, substeps: int
+) -> tuple[Float[np.ndarray, "d t nq"], Float[np.ndarray, "d t nv"], Float[np.ndarray, "d t nu"]]:
+    """qpos, qvel and controls at every frame. Frame 0 is the demonstration's own start, at rest, without offsets.
+
+    Runs on MuJoCo's C engine whatever engine trains: it is quick, and done once.
+    """
+    targets = np.asarray(reference.targets, float)
+    pose = np.asarray(reference.object_pose, float)
+    count, frames = targets.shape[:2]
+    low, high = models[0].actuator_ctrlrange.T
+    controls = np.clip(np.asarray(reference.controls + reference.grip, float), low, high)
+    speed = _object_speed(pose, models[0].opt.timestep * substeps)
+
+    worlds = batch.Batch(models[0], nsim=count)
+    worlds.set_models([_with_heavy_object(model) for model in models])
+    qpos = np.zeros((count, frames, models[0].nq))
+    qvel = np.zeros((count, frames, models[0].nv))
+    now, moving = worlds.bind("qpos"), worlds.bind("qvel")
+    now[:, :_NUM_TARGETS], now[:, _NUM_TARGETS:] = targets[:, 0], pose[:, 0]
+    qpos[:, 0] = now
+    for t in range(1, frames):
+        worlds.bind("ctrl")[:] = controls[:, t]
+        worlds.step(nstep=substeps)
+        now[:, _NUM_TARGETS:], moving[:, _NUM_TARGETS:] = pose[:, t], speed[:, t]
+        qpos[:, t], qvel[:, t] = now, moving
+    return qpos, qvel, controls
+
+
+def _with_heavy_object(model: mujoco.MjModel) -> mujoco.MjModel:
+    """A copy in which fingers cannot push the object away or sink into it while it is carried."""
+    heavy = copy.copy(model)
+    thing = heavy.body(OBJECT).id
+    heavy.body_mass[thing] *= _HEAVIER
+    heavy.body_inertia[thing] *= _HEAVIER
+    heavy.body_gravcomp[thing] = 1.0
+    mujoco.mj_setConst(heavy, mujoco.MjData(heavy))
+    return heavy
+
+
+def _object_speed(pose: Float[np.ndarray, "d t 7"], dt: float) -> Float[np.ndarray, "d t 6"]:
+    """Free-joint velocities by central differences: linear in the world (m/s), angular in the object's frame (rad/s)."""
+    count, frames = pose.shape[:2]
+    before, after = np.maximum(np.arange(frames) - 1, 0), np.minimum(np.arange(frames) + 1, frames - 1)
+    seconds = ((after - before) * dt)[:, None]
+    linear = (pose[:, after, :3] - pose[:, before, :3]) / seconds
+    first = Rotation.from_quat(pose[:, before, 3:].reshape(-1, 4), scalar_first=True)
+    last = Rotation.from_quat(pose[:, after, 3:].reshape(-1, 4), scalar_first=True)
+    angular = (first.inv() * last).as_rotvec().reshape(count, frames, 3) / seconds
+    return np.concatenate([linear, angular], axis=-1)

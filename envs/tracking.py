@@ -1,0 +1,176 @@
+"""`TrackingEnv`: a twin of the hand replays demonstrations, with a residual that mends what replaying alone loses.
+
+target(t) = demonstration(t) + residual(t), led by the controllers' own lag; residual <- tau residual + (1 - tau) scale action (arXiv 2512.07359, section IV).
+"""
+
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from brax.envs.base import Env, State
+from jaxtyping import Array, Float, Int
+
+from envs.observation import observe, residual_scale
+from envs.physics import make_engine
+from envs.physics.engine import PhysicsState
+from envs.reference import make_reference
+from envs.replay import assisted_replay
+from envs.scene import NUM_WRIST, base_rotation, scene_model
+from envs.task import Task
+from mjx_hand.errors import InputError
+from mjx_hand.hand.joints import NUM_HINGES
+from mjx_hand.motion.demonstration import Demonstration
+from mjx_hand.pytree import pytree
+from mjx_hand.rigid.gains import Gains
+from mjx_hand.rigid.rigid_hand import RigidHand
+from mjx_hand.rotations import quaternion_difference
+
+_TAIL = 10  # no episode starts in a demonstration's last frames, where nothing is left to learn
+
+
+@pytree
+class Twin:
+    """A world's state: physics, which demonstration it follows, how far it is, and the residual so far."""
+
+    physics: PhysicsState
+    demonstration: Int[Array, ""]
+    frame: Int[Array, ""]
+    residual: Float[Array, "26"]
+
+
+class TrackingEnv(Env):
+    """One world; `jax.vmap` it for many. Brax's `State` carries a `Twin` as its pipeline state.
+
+    Actions are 26 numbers in [-1, 1], residuals of the wrist's 3 slides and 3 turns and of the 20 hinges.
+
+    Args:
+        demonstrations: what to track; the i-th runs on the i-th hand.
+        hands: the twin's hand for each demonstration, built from the person's fitted shape.
+        engine: "auto", "native", "mjx" or "warp".
+        task: rewards, residual ranges, resets.
+        gains: of the hand's position controllers.
+
+    Raises:
+        InputError: demonstrations that do not fit together, a rate the task cannot keep, or an unknown engine.
+    """
+
+    def __init__(
+        self,
+        demonstrations: Sequence[Demonstration],
+        hands: Sequence[RigidHand],
+        engine: str = "auto",
+        task: Task | None = None,
+        gains: Gains | None = None,
+    ):
+        self.task = Task() if task is None else task
+        gains = Gains() if gains is None else gains
+        self.reference = make_reference(
+            demonstrations, hands, grip_force=self.task.grip_force, grip_reach=self.task.finger, gains=gains
+        )
+        self.models = [
+            scene_model(hand, d.object, d.support, d.support_position, base_rotation(d), gains=gains)
+            for d, hand in zip(demonstrations, hands, strict=True)
+        ]
+        self.engine = make_engine(engine, self.models, self.task.substeps)
+        self.dt = float(self.models[0].opt.timestep * self.task.substeps)
+        self.fps = demonstrations[0].motion.fps
+        if abs(self.fps * self.dt - 1) > 1e-3:
+            raise InputError(
+                f"demonstrations at {self.fps:g} frames/s do not fit control steps of {self.dt * 1000:g} ms; "
+                f"resample them to {1 / self.dt:g} frames/s"
+            )
+        self._low, self._high = (jnp.asarray(side, jnp.float32) for side in self.models[0].actuator_ctrlrange.T)
+        self._starts = self._start_table()
+
+    @property
+    def num_demonstrations(self) -> int:
+        return len(self.models)
+
+    @property
+    def action_size(self) -> int:
+        return NUM_WRIST + NUM_HINGES
+
+    @property
+    def observation_size(self) -> int:
+        return jax.eval_shape(self.reset, jax.random.key(0)).obs.shape[-1]
+
+    @property
+    def backend(self) -> str:
+        return self.engine.name
+
+    def reset(self, rng: Array) -> State:
+        """A training episode: a random demonstration, in its middle with probability `task.mid_start`."""
+        which, whether, where = jax.random.split(rng, 3)
+        demonstration = jax.random.randint(which, (), 0, self.num_demonstrations)
+        last = jnp.maximum(self.reference.length[demonstration] - _TAIL, 1)
+        frame = jax.random.randint(where, (), 0, last)
+        frame = jnp.where(jax.random.bernoulli(whether, self.task.mid_start), frame, 0)
+        return self.start(demonstration, frame)
+
+    def start(self, demonstration: Int[Array, ""], frame: Int[Array, ""]) -> State:
+        """The state at a frame of a demonstration; frame 0 is the unassisted start that evaluations use."""
+        physics = jax.tree.map(lambda table: table[demonstration, frame], self._starts)
+        # A grasp in mid-air is only consistent if the controller already presses: start with the grip as the residual.
+        residual = self.reference.grip[demonstration, frame] * (frame > 0)
+        twin = Twin(
+            physics=physics,
+            demonstration=jnp.asarray(demonstration, jnp.int32),
+            frame=jnp.asarray(frame, jnp.int32),
+            residual=residual,
+        )
+        zero = jnp.zeros(())
+        metrics = {name: zero for name in (*_TERMS, "error/position", "error/rotation", "unstable")}
+        return State(twin, self._observe(twin), zero, zero, metrics, {"truncation": zero})  # type: ignore[call-arg]
+
+    def step(self, state: State, action: Float[Array, "26"]) -> State:
+        """One control step towards the next frame of the demonstration; past its end the last frame is held."""
+        twin: Twin = state.pipeline_state  # type: ignore[assignment]
+        task = self.task
+        residual = task.smoothing * twin.residual + (1 - task.smoothing) * residual_scale(task) * action
+        length = self.reference.length[twin.demonstration]
+        frame = jnp.minimum(twin.frame + 1, length - 1)
+        target = self.reference.controls[twin.demonstration, frame] + residual
+        physics = self.engine.step(twin.physics, jnp.clip(target, self._low, self._high))
+        twin = Twin(physics=physics, demonstration=twin.demonstration, frame=frame, residual=residual)
+
+        position, rotation = self._errors(twin)
+        terms = {
+            "reward/position": jnp.exp(-task.position_sharpness * position),
+            "reward/rotation": jnp.exp(-task.rotation_sharpness * rotation),
+            "reward/action": -task.action_cost * jnp.sum(action**2),
+        }
+        done = jnp.maximum((position > task.lost_at).astype(jnp.float32), physics.unstable)
+        finished = (frame >= length - 1).astype(jnp.float32)
+        metrics = {**terms, "error/position": position, "error/rotation": rotation, "unstable": physics.unstable}
+        info = {**state.info, "truncation": finished * (1 - done)}
+        return state.replace(  # type: ignore[attr-defined]
+            pipeline_state=twin,
+            obs=self._observe(twin),
+            reward=sum(terms.values()),
+            done=jnp.maximum(done, finished),
+            metrics=metrics,
+            info=info,
+        )
+
+    def _observe(self, twin: Twin) -> Float[Array, "o"]:
+        return observe(self.reference, self.task, twin.demonstration, twin.frame, twin.physics, twin.residual)
+
+    def _errors(self, twin: Twin) -> tuple[Array, Array]:
+        """The object's distance (m) and angle (rad) from where the demonstration has it."""
+        pose = self.reference.object_pose[twin.demonstration, twin.frame]
+        thing = twin.physics.qpos[NUM_WRIST + NUM_HINGES :]
+        turn = quaternion_difference(pose[3:], thing[3:])
+        return jnp.linalg.norm(thing[:3] - pose[:3]), jnp.sqrt(jnp.sum(turn**2) + 1e-12)
+
+    def _start_table(self) -> PhysicsState:
+        """The engine's state at every frame of every demonstration, so that a reset is a look-up."""
+        qpos, qvel, ctrl = assisted_replay(self.models, self.reference, self.task.substeps)
+        count, frames = qpos.shape[:2]
+        variant = np.repeat(np.arange(count, dtype=np.int32), frames)
+        rows = (variant, *(np.asarray(a, np.float32).reshape(count * frames, -1) for a in (qpos, qvel, ctrl)))
+        table = jax.jit(lambda r: jax.lax.map(lambda row: self.engine.reset(*row), r, batch_size=1024))(rows)
+        return jax.tree.map(lambda leaf: leaf.reshape(count, frames, *leaf.shape[1:]), table)
+
+
+_TERMS = ("reward/position", "reward/rotation", "reward/action")
