@@ -10,7 +10,7 @@ from mjx_hand.capture.linearise import PoseState
 from mjx_hand.capture.pose_solver import Frames, PoseEstimate, solve_poses
 from mjx_hand.capture.skinned_points import SkinnedPoints
 
-CHUNK = 512  # frames a call
+CHUNK = 256  # frames a call
 Array = np.ndarray
 
 

@@ -20,9 +20,9 @@ from mjx_hand.capture.skinned_points import skinned_points
 from mjx_hand.capture.smoothing import smooth_vectors
 from mjx_hand.capture.stages import begin, between_keyframes, drawn_towards, joined, keyframes
 from mjx_hand.capture.track import Track, make_track, palm_weights
-from mjx_hand.capture.wrist import fill_poses
 from mjx_hand.errors import InputError
 from mjx_hand.hand.model import HandModel
+from mjx_hand.motion.gaps import fill_lines, fill_turns
 from mjx_hand.motion.motion import Motion
 from mjx_hand.motion.resample import matrix_quaternions
 from mjx_hand.pytree import replace
@@ -35,7 +35,7 @@ INDEPENDENT = 2.4
 # How far (m) a marker coordinate is from the model while the shape is the mean one. Believed more, markers fold a
 # joint the wrong way to make up for a bone's length.
 MEAN_SHAPE_DEVIATION = 0.005
-KEYFRAME_STEPS, SUBJECT_STEPS, FRAME_STEPS, SMOOTH_STEPS = 15, 25, 4, 2
+KEYFRAME_STEPS, SUBJECT_STEPS, FRAME_STEPS, SMOOTH_STEPS = 15, 18, 4, 2
 
 
 @dataclass(frozen=True)
@@ -165,14 +165,13 @@ def make_motion(track: Track, state: PoseState, subject: Subject, hand: HandMode
     vectors = state.vectors.astype(np.float64).reshape(-1, 3)
     rotations[track.frames] = Rotation.from_rotvec(vectors).as_matrix().reshape(-1, 15, 3, 3)
     wrist_rotation, wrist_position = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
-    wrist_rotation[track.frames] = Rotation.from_matrix(state.wrist_rotation.astype(np.float64)).as_matrix()
+    wrist_rotation[track.frames] = state.wrist_rotation
     wrist_position[track.frames] = state.wrist_position + track.shift
-    wrist_rotation, wrist_position = fill_poses(wrist_rotation, wrist_position, valid)
     return Motion(
         fps=track.recording.fps,
         rotations=rotations,
-        wrist_position=wrist_position,
-        wrist_quaternion=matrix_quaternions(wrist_rotation),
+        wrist_position=fill_lines(wrist_position, valid),
+        wrist_quaternion=fill_turns(matrix_quaternions(wrist_rotation), valid),
         shape=np.asarray(subject.shape, np.float64),
         valid=valid,
         side=hand.side,

@@ -72,7 +72,7 @@ class PoseEstimate:
     Attributes:
         state: the poses.
         residual: predicted less observed markers, m, in the axes of the hand.
-        covariance: posterior covariance of each joint's rotation vector, rad^2.
+        covariance: posterior covariance of each joint's rotation vector, rad^2, at the last linearisation.
     """
 
     state: PoseState
@@ -82,28 +82,30 @@ class PoseEstimate:
 
 @jax.jit
 def solve_poses(points: SkinnedPoints, frames: Frames, state: PoseState, iterations: Int[Array, ""]) -> PoseEstimate:
-    """The poses after a fixed number of damped Gauss-Newton steps.
+    """The poses after a fixed number, one or more, of damped Gauss-Newton steps.
 
     A frame whose energy a step does not lower stays where it is and is damped more.
     """
 
-    def iterate(_: Array, carry: tuple[PoseState, Array]) -> tuple[PoseState, Array]:
-        state, damping = carry
-        normal, gradient, before, _unused = normal_equations(points, frames, state)
+    count = frames.observed.shape[0]
+
+    def iterate(_: Array, carry: tuple[PoseState, Array, NormalBlocks]) -> tuple[PoseState, Array, NormalBlocks]:
+        state, damping, _previous = carry
+        normal, gradient, before, _derivatives = normal_equations(points, frames, state)
         step = -solve_blocks(damped(normal, damping, FLOOR), gradient[..., None])[..., 0]
         candidate = step_state(state, step)
         residual = residuals(points, frames.rest, frames.centres, candidate, frames.observed)
         better = energy(frames, residual, candidate) < before
         chosen = jax.tree.map(lambda new, old: jnp.where(_like(better, new), new, old), candidate, state)
-        return chosen, damping * jnp.where(better, ACCEPTED, REJECTED)
+        return chosen, damping * jnp.where(better, ACCEPTED, REJECTED), normal
 
-    damping = jnp.full(frames.observed.shape[0], INITIAL_DAMPING)
-    state, _ = jax.lax.fori_loop(0, iterations, iterate, (state, damping))
-    normal, _, _, _ = normal_equations(points, frames, state)
+    start = normal_blocks(jnp.zeros((count, 1, NUM_POSE)))
+    state, _, normal = jax.lax.fori_loop(0, iterations, iterate, (state, jnp.full(count, INITIAL_DAMPING), start))
     return PoseEstimate(
         state=state,
         residual=residuals(points, frames.rest, frames.centres, state, frames.observed),
-        covariance=joint_covariance(damped(normal, jnp.zeros(normal.wrist.shape[0]), FLOOR)),
+        # The last linearisation is one small step from where the poses are now.
+        covariance=joint_covariance(damped(normal, jnp.zeros(count), FLOOR)),
     )
 
 

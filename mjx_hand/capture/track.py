@@ -7,8 +7,10 @@ from jaxtyping import Bool, Float, Int
 
 from mjx_hand.capture.marker_set import MarkerSet
 from mjx_hand.capture.recording import MarkerRecording, check_recording
-from mjx_hand.capture.wrist import fill_poses, rigid_fit
+from mjx_hand.capture.wrist import rigid_fit
 from mjx_hand.errors import InputError
+from mjx_hand.motion.gaps import fill_lines, fill_turns
+from mjx_hand.motion.resample import matrix_quaternions, quaternion_matrices
 
 PALM = 0.25  # least weight of the wrist's link at a marker that tells where the wrist is
 MIN_PALM = 3
@@ -91,5 +93,5 @@ def wrist_guess(
         raise InputError(
             f"{name}: no frame shows {MIN_PALM} markers of the palm that are not on a line; nothing to fit"
         )
-    rotation, position = fill_poses(rotation, position + track.shift, known)
-    return rotation, position - track.shift
+    rotation = quaternion_matrices(fill_turns(matrix_quaternions(rotation), known))
+    return rotation, fill_lines(position + track.shift, known) - track.shift

@@ -3,8 +3,6 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
-from mjx_hand.motion.resample import interpolation_index, slerp
-
 Array = np.ndarray
 
 
@@ -29,19 +27,3 @@ def rigid_fit(
     # The middle singular value is the spread across the line that markers may lie on: at least (5 mm)^2 a marker.
     determined = ((weight > 0).sum(axis=1) >= 3) & (size[:, 1] / total > 2.5e-5)
     return rotation, translation, determined
-
-
-def fill_poses(
-    rotation: Float[Array, "t 3 3"], position: Float[Array, "t 3"], known: Bool[Array, "t"]
-) -> tuple[Float[Array, "t 3 3"], Float[Array, "t 3"]]:
-    """Poses with those not known interpolated between, and held beyond, the known ones (at least one)."""
-    good = np.flatnonzero(known)
-    missing = np.flatnonzero(~known)
-    if missing.size == 0:
-        return rotation, position
-    before, after, fraction = interpolation_index(good.astype(float), missing.astype(float))
-    before, after = good[before], good[after]
-    rotation, position = rotation.copy(), position.copy()
-    rotation[missing] = slerp(rotation[before], rotation[after], fraction)
-    position[missing] = (1 - fraction)[:, None] * position[before] + fraction[:, None] * position[after]
-    return rotation, position
