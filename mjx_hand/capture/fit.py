@@ -48,7 +48,8 @@ class FitSettings:
         min_visible: markers that a frame must show to be valid.
         acceleration: standard deviation of the angular acceleration of a finger joint, rad/s^2.
         smoothing_deviation: how far (rad) a joint is expected to be from the smooth course.
-        max_residual: RMS distance (m) of a marker from the fitted hand above which the recording is refused.
+        max_distance: how far (m) a marker may be from the fitted hand (RMS), or be found from where the marker set
+            puts it, before the recording is refused.
     """
 
     marker_deviation: float = 0.001
@@ -56,7 +57,7 @@ class FitSettings:
     min_visible: int = 8
     acceleration: float = 50.0
     smoothing_deviation: float = 0.05
-    max_residual: float = 0.010
+    max_distance: float = 0.010
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -150,7 +151,7 @@ def fit_many(
         motion = make_motion(track, jax.tree.map(lambda a, at=at: a[at], found.state), subject, hand)
         offsets = np.asarray(subject.offsets)
         report = make_report(
-            track, found.residual[at], offsets, marker_set.names, FRAME_STEPS + SMOOTH_STEPS, settings.max_residual
+            track, found.residual[at], offsets, marker_set.names, FRAME_STEPS + SMOOTH_STEPS, settings.max_distance
         )
         out.append((motion, report))
     return out

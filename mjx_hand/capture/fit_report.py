@@ -33,21 +33,23 @@ def make_report(
     offsets: Float[np.ndarray, "m 3"],
     names: tuple[str, ...],
     iterations: int,
-    max_residual: float,
+    max_distance: float,
 ) -> FitReport:
     """The report of a fit whose markers are `residual` (m) away.
 
     Raises:
-        InputError: a marker's RMS distance is above `max_residual`.
+        InputError: a marker's RMS distance, or its offset, is above `max_distance`. Offsets give swapped names away:
+            they soak up the centimetres that the swap makes, and leave a small residual.
     """
     squared = np.where(track.visible, (residual.astype(np.float64) ** 2).sum(axis=-1), 0.0)
     marker_rms = np.sqrt(squared.sum(axis=0) / np.maximum(track.visible.sum(axis=0), 1))
-    bad = np.flatnonzero(marker_rms > max_residual)
+    off = np.maximum(marker_rms, np.linalg.norm(offsets, axis=1))
+    bad = np.flatnonzero(off > max_distance)
     if bad.size:
-        worst = ", ".join(f"{names[m]} {1000 * marker_rms[m]:.0f} mm" for m in bad[np.argsort(-marker_rms[bad])][:4])
+        worst = ", ".join(f"{names[m]} {1000 * off[m]:.0f} mm" for m in bad[np.argsort(-off[bad])][:4])
         raise InputError(
             f"{track.recording.source or 'recording'}: no hand explains these markers ({worst} off, at most "
-            f"{1000 * max_residual:.0f} allowed); check for swapped names, the hand's side and metres"
+            f"{1000 * max_distance:.0f} allowed); check for swapped names, the hand's side and metres"
         )
     rms = float(np.sqrt(squared.sum() / track.visible.sum()))
     return FitReport(marker_rms=marker_rms, rms=rms, offsets=offsets, iterations=iterations, names=names)

@@ -128,11 +128,15 @@ def test_progress_reaches_one(hand, marker_set, noisy):
     assert shares[-1] == pytest.approx(1)
 
 
-def test_swapped_names_are_noticed(hand, marker_set, noisy):
+@pytest.mark.parametrize(
+    "pair",
+    [("index_nail", "middle_nail"), ("index_pip", "index_dip"), ("ring_mcp", "pinky_mcp"), ("thumb_ip", "thumb_nail")],
+)
+def test_swapped_names_are_noticed(hand, marker_set, noisy, pair):
     names = list(noisy[0].recording.names)
-    a, b = names.index("index_nail"), names.index("pinky_nail")
+    a, b = (names.index(name) for name in pair)
     names[a], names[b] = names[b], names[a]
-    with pytest.raises(InputError, match=r"no hand explains.*(index|pinky)_nail.*swapped"):
+    with pytest.raises(InputError, match=f"no hand explains these markers .*({pair[0]}|{pair[1]}).*swapped"):
         fit_markers(dataclasses.replace(noisy[0].recording, names=tuple(names)), hand, marker_set)
 
 
