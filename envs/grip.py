@@ -76,3 +76,4 @@ def grip_offsets(
         return closing + jnp.clip(torque, -limit, limit) / stiffness
 
     return jax.lax.map(lambda row: one(*row), (angles, *object_in_hand), batch_size=64)
+

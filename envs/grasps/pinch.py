@@ -5,14 +5,14 @@ from envs.grasps.grasp_type import Contact, GraspType
 GRASP = GraspType(
     name="pinch",
     object_kind="box",
-    object_size=((0.0130, 0.0130, 0.0130), (0.0175, 0.0175, 0.0175)),
+    object_size=((0.0150, 0.0150, 0.0150), (0.0190, 0.0190, 0.0190)),
     object_mass=(0.05, 0.2),
     object_friction=(0.8, 1.0),
     support=(0.03, 0.03, 0.015),
     contacts=(
         Contact("thumb3", 0.75, (-1.0, 0.0, 0.0)),
-        Contact("index3", 0.75, (1.0, 0.0, 0.0), (0.0, 0.008, 0.0)),
-        Contact("middle3", 0.75, (1.0, 0.0, 0.0), (0.0, -0.008, 0.0)),
+        Contact("index3", 0.75, (1.0, 0.0, 0.0), (0.0, 0.007, 0.0)),
+        Contact("middle3", 0.75, (1.0, 0.0, 0.0), (0.0, -0.007, 0.0)),
     ),
     # index, middle, pinky, ring, thumb: abduction (negative is towards the thumb), flexion, two hinges outwards
     posture=(
@@ -25,7 +25,7 @@ GRASP = GraspType(
     opening=0.015,
     # palm down, fingers along world +x and tilted 35 degrees towards the table
     wrist_rotation=((-0.819, 0.574, 0.0), (0.0, 0.0, 1.0), (0.574, 0.819, 0.0)),
-    approach=(-0.03, 0.0, 0.07),
+    approach=(0.0, 0.0, 0.07),
     squeeze=9.0,
     lift=(0.10, 0.15),
     carry=(0.06, 0.10),
