@@ -1,8 +1,8 @@
 """Grip offsets: what the fingers must add to a demonstration's angles so that they press on the object.
 
-A recording shows where fingers are, not how hard they press; its replay alone drops the object. The offset that makes each
-touching finger press with a few newtons is the starting point of reference-state initialisation, nothing more: policies
-are evaluated without it.
+A recording shows where fingers are, not how hard they press: replayed alone it drops the object. The offsets follow from
+the demonstration and the object's shape alone, without simulation. Added to the reference they hold some objects for some
+time; the policy's residual does the rest.
 """
 
 import jax

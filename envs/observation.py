@@ -45,7 +45,7 @@ def observe(
 ) -> Float[Array, "o"]:
     """The observation at `frame` of a demonstration.
 
-    Own pose against the reference, speeds, the residual so far and the grip that geometry suggests; the object against its reference, in the wrist's base frame;
+    Own pose against the reference, speeds, the residual so far and the grip; the object against its reference, in the wrist's base frame;
     finger tips around the object, in its own frame; targets and object some frames ahead; phase, and what the object is.
     """
     base = reference.base[demonstration]
@@ -64,7 +64,7 @@ def observe(
             (hand - now) * _TARGET_SCALE,
             hand_speed * _SPEED_SCALE,
             residual / residual_scale(task),
-            reference.grip[demonstration, frame] / residual_scale(task),
+            reference.grip[demonstration, frame, NUM_WRIST:] * 5.0,
             base.T @ (thing[:3] - pose[:3]) * _LENGTH_SCALE,
             quaternion_difference(pose[3:], thing[3:]) * 3.0,
             base.T @ speed[:3] * 3.0,

@@ -23,8 +23,8 @@ class Reference:
 
     Attributes:
         targets: the wrist's slides and turns, and the hinge angles, as demonstrated.
-        controls: what to command so that the controllers are at each target when its frame comes.
-        grip: what reference-state initialisation adds to them, within the residual's reach.
+        controls: what to command so that the controllers are at each target when its frame comes, and press.
+        grip: the share of the controls that presses the fingers on the object.
         object_pose: in the world.
         base: world_from_base of each scene's wrist.
         features: object size (m), mass (kg) and friction.
@@ -45,10 +45,9 @@ def make_reference(
     hands: Sequence[RigidHand],
     *,
     grip_force: float,
-    grip_reach: float,
     gains: Gains,
 ) -> Reference:
-    """Stack demonstrations and work out their grip offsets.
+    """Stack demonstrations and work out their controls; a `grip_force` of 0 N replays them as they are.
 
     Raises:
         InputError: none given, several rates, or several kinds of object (one model family has one kind).
@@ -79,13 +78,16 @@ def make_reference(
 
         return jax.vmap(one)(angles, rotation, position, hands, sizes)
 
-    grip = grips(targets[..., NUM_WRIST:], rotation, position, stack_hands(hands), sizes)
-    grip = jnp.clip(grip, -grip_reach, grip_reach)
+    if grip_force > 0:
+        grip = grips(targets[..., NUM_WRIST:], rotation, position, stack_hands(hands), sizes)
+    else:
+        grip = jnp.zeros_like(targets[..., NUM_WRIST:])
+    grip = jnp.concatenate([jnp.zeros((*grip.shape[:2], NUM_WRIST)), grip], axis=-1)
     features = [[*d.object.size, d.object.mass, d.object.friction] for d in demonstrations]
     return Reference(
         targets=targets,
-        controls=_anticipated(targets, gains, demonstrations[0].motion.fps),
-        grip=jnp.concatenate([jnp.zeros((*grip.shape[:2], NUM_WRIST)), grip], axis=-1),
+        controls=_anticipated(targets, gains, demonstrations[0].motion.fps) + grip,
+        grip=grip,
         object_pose=jnp.asarray(np.stack(poses), jnp.float32),
         base=jnp.asarray(np.stack(bases), jnp.float32),
         features=jnp.asarray(features, jnp.float32),

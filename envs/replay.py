@@ -1,4 +1,4 @@
-"""Assisted replay: each demonstration rolled out once with grip offsets while the object is carried along its reference.
+"""Assisted replay: each demonstration rolled out once while the object is carried along its reference.
 
 Its states are where training episodes may start (reference-state initialisation): consistent in the physics, because the
 hand really moved there under its controller and really presses on the object.
@@ -32,7 +32,7 @@ def assisted_replay(
     pose = np.asarray(reference.object_pose, float)
     count, frames = targets.shape[:2]
     low, high = models[0].actuator_ctrlrange.T
-    controls = np.clip(np.asarray(reference.controls + reference.grip, float), low, high)
+    controls = np.clip(np.asarray(reference.controls, float), low, high)
     speed = _object_speed(pose, models[0].opt.timestep * substeps)
 
     worlds = batch.Batch(models[0], nsim=count)

@@ -20,7 +20,7 @@ class Task:
         lost_at: a rollout ends when the object is this far from its reference.
         mid_start: share of training episodes that start in the middle of a demonstration, at a state from its own
             assisted replay (reference-state initialisation); the rest start at frame 0.
-        grip_force: force (N) with which that replay presses its finger tips on the object.
+        grip_force: force (N) with which the reference presses finger tips that touch; 0 replays demonstrations as they are.
         ahead: how many frames ahead the policy sees the reference.
     """
 
@@ -34,7 +34,7 @@ class Task:
     action_cost: float = 0.002
     lost_at: float = 0.08
     mid_start: float = 0.7
-    grip_force: float = 6.0
+    grip_force: float = 8.0
     ahead: tuple[int, ...] = (1, 4, 12)
 
     def __post_init__(self):

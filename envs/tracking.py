@@ -1,6 +1,6 @@
 """`TrackingEnv`: a twin of the hand replays demonstrations, with a residual that mends what replaying alone loses.
 
-target(t) = demonstration(t) + residual(t), led by the controllers' own lag; residual <- tau residual + (1 - tau) scale action (arXiv 2512.07359, section IV).
+target(t) = demonstration(t) + grip(t) + residual(t), led by the controllers' own lag; residual <- tau residual + (1 - tau) scale action (arXiv 2512.07359, section IV).
 """
 
 from collections.abc import Sequence
@@ -65,9 +65,7 @@ class TrackingEnv(Env):
     ):
         self.task = Task() if task is None else task
         gains = Gains() if gains is None else gains
-        self.reference = make_reference(
-            demonstrations, hands, grip_force=self.task.grip_force, grip_reach=self.task.finger, gains=gains
-        )
+        self.reference = make_reference(demonstrations, hands, grip_force=self.task.grip_force, gains=gains)
         self.models = [
             scene_model(hand, d.object, d.support, d.support_position, base_rotation(d), gains=gains)
             for d, hand in zip(demonstrations, hands, strict=True)
@@ -111,13 +109,11 @@ class TrackingEnv(Env):
     def start(self, demonstration: Int[Array, ""], frame: Int[Array, ""]) -> State:
         """The state at a frame of a demonstration; frame 0 is the unassisted start that evaluations use."""
         physics = jax.tree.map(lambda table: table[demonstration, frame], self._starts)
-        # A grasp in mid-air is only consistent if the controller already presses: start with the grip as the residual.
-        residual = self.reference.grip[demonstration, frame] * (frame > 0)
         twin = Twin(
             physics=physics,
             demonstration=jnp.asarray(demonstration, jnp.int32),
             frame=jnp.asarray(frame, jnp.int32),
-            residual=residual,
+            residual=jnp.zeros(self.action_size),
         )
         zero = jnp.zeros(())
         metrics = {name: zero for name in (*_TERMS, "error/position", "error/rotation", "unstable")}
@@ -127,6 +123,7 @@ class TrackingEnv(Env):
         """One control step towards the next frame of the demonstration; past its end the last frame is held."""
         twin: Twin = state.pipeline_state  # type: ignore[assignment]
         task = self.task
+        action = jnp.clip(action, -1.0, 1.0)
         residual = task.smoothing * twin.residual + (1 - task.smoothing) * residual_scale(task) * action
         length = self.reference.length[twin.demonstration]
         frame = jnp.minimum(twin.frame + 1, length - 1)
