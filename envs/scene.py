@@ -58,7 +58,7 @@ def scene_model(
     for geom in spec.geoms:
         if geom.contype:
             geom.contype, geom.conaffinity = _HAND_MEETS
-            _contact(geom, thing.friction)
+            _contact(geom, thing.friction, condim=4)  # torsion too: a pad is an area, not a point
     _add_ground(spec, support, support_position, thing.friction)
     body = spec.worldbody.add_body(name=OBJECT)
     body.add_freejoint(name=OBJECT)
@@ -70,8 +70,8 @@ def scene_model(
     return spec.compile()
 
 
-def _contact(geom: mujoco.MjsGeom, friction: float) -> None:
-    geom.condim = 4  # torsion too: a pad is an area, not a point
+def _contact(geom: mujoco.MjsGeom, friction: float, condim: int = 3) -> None:
+    geom.condim = condim
     geom.friction = [friction, 0.005, 0.0001]
     geom.solref = [0.01, 1.0]  # 0.02 costs a pinch twenty points of success
 

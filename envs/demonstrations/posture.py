@@ -18,6 +18,7 @@ from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics, stack_hands
 from mjx_hand.rotations import exp
 
 _STEPS = 60
+_BATCH = 16  # hands a compiled call, so that any number of hands compiles once
 _ALONG = jnp.linspace(0.0, 1.0, 4)  # where along each capsule's axis distances are taken
 _OPENING_DAMPING = 0.01  # m/rad
 # What one unit of residual is worth (m, rad).
@@ -46,8 +47,12 @@ class Posture:
 
 
 def solve_postures(grasp: GraspType, hands: Sequence[RigidHand], sizes: Float[np.ndarray, "n 3"]) -> Posture:
-    """The posture of each hand on an object of the size beside it, in one jitted call (leading axis n)."""
-    return _solve_all(grasp, stack_hands(hands), jnp.asarray(sizes, jnp.float32))
+    """The posture of each hand on an object of the size beside it (leading axis n)."""
+    parts = []
+    for start in range(0, len(hands), _BATCH):
+        rows = [min(start + k, len(hands) - 1) for k in range(_BATCH)]  # the last batch repeats its last hand
+        parts.append(_solve_all(grasp, stack_hands([hands[k] for k in rows]), jnp.asarray(sizes[rows], jnp.float32)))
+    return jax.tree.map(lambda *leaves: jnp.concatenate(leaves)[: len(hands)], *parts)
 
 
 def squeeze_angles(grasp: GraspType, posture: Posture, gains: Gains) -> Float[np.ndarray, "20"]:

@@ -7,6 +7,7 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import jax
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
@@ -23,6 +24,7 @@ from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.motion.motion import Motion
 from mjx_hand.motion.resample import matrix_quaternions, resample_motion
 from mjx_hand.motion.smooth import CUTOFF, low_pass, smooth_rows
+from mjx_hand.pytree import replace
 from mjx_hand.retarget.sequence import retarget_sequence
 from mjx_hand.rigid.build import build_rigid_hand
 from mjx_hand.rigid.rigid_hand import RigidHand, joint_rotations
@@ -98,8 +100,9 @@ def record_trials(
     markers = included_marker_set(model)
     seeds = np.random.SeedSequence(seed).generate_state(3 * len(trials)).reshape(-1, 3).tolist()
     recordings = []
+    rotations = _true_rotations(trials, hands)
     for k, trial in enumerate(trials):
-        motion = _true_motion(trial, hands[trial.person], shapes[trial.person], model, settings, seeds[k][0])
+        motion = _true_motion(trial, rotations[k], shapes[trial.person], model, settings, seeds[k][0])
         recordings.append(
             simulate_markers(
                 model,
@@ -118,7 +121,7 @@ def record_trials(
         truth = _truth(trial, shapes[trial.person], joints.num_frames, settings.rate)
         source = f"simulated {grasp}, person {trial.person}, seed {seed}.{k}"
         demonstration = Demonstration(
-            motion=dataclasses.replace(joints, source=source),
+            motion=replace(joints, source=source),
             object_pose=_measured(truth.object_pose, settings, seeds[k][2]),
             object=trial.object,
             support=support,
@@ -131,24 +134,41 @@ def record_trials(
     return out
 
 
+def _true_rotations(trials: Sequence[Trial], hands: Sequence[RigidHand]) -> list[Float[np.ndarray, "t 15 3 3"]]:
+    """Each trial's true MANO rotations; padded to one length, so that one compilation serves all."""
+    frames = max(len(trial.angles) for trial in trials)
+    rotate = jax.jit(joint_rotations)
+    out = []
+    for trial in trials:
+        missing = frames - len(trial.angles)
+        angles = np.pad(trial.angles, ((0, missing), (0, 0)), mode="edge").astype(np.float32)
+        hand = replace(hands[trial.person], mesh_vertices=(), mesh_faces=())
+        out.append(np.asarray(rotate(angles, hand), np.float64)[: len(trial.angles)])
+    return out
+
+
 def _true_motion(
-    trial: Trial, hand: RigidHand, shape: np.ndarray, model: HandModel, settings: CaptureSettings, seed: int
+    trial: Trial,
+    rotations: Float[np.ndarray, "t 15 3 3"],
+    shape: Float[np.ndarray, "s"],
+    model: HandModel,
+    settings: CaptureSettings,
+    seed: int,
 ) -> Motion:
     """The trial as the moving skin that a marker system sees, off-axis rotations added."""
-    frames = len(trial.angles)
     moved = Motion(
         fps=1 / TIMESTEP,
-        rotations=np.asarray(joint_rotations(trial.angles.astype(np.float32), hand), np.float64),
+        rotations=rotations,
         wrist_position=trial.wrist_position,
         wrist_quaternion=Rotation.from_matrix(trial.wrist_rotation).as_quat(scalar_first=True),
         shape=shape,
-        valid=np.ones(frames, bool),
+        valid=np.ones(len(rotations), bool),
         side=model.side,
         source="performed trial",
     )
     moved = resample_motion(moved, settings.fps)
     rotations = add_off_axis_rotation(moved.rotations, seed, settings.off_axis, settings.fps)
-    return dataclasses.replace(moved, rotations=rotations)
+    return replace(moved, rotations=rotations)
 
 
 def _truth(trial: Trial, shape: np.ndarray, frames: int, rate: float) -> Truth:

@@ -17,6 +17,9 @@ from mjx_hand.rigid.rigid_hand import RigidHand, chain, joint_rotations, tip_pos
 from mjx_hand.rotations import geodesic_angle
 
 
+_FRAMES = 256  # sequences are padded to a multiple of this, so that most lengths share a compilation
+
+
 @pytree
 class RetargetErrors:
     """What the 20 hinges could not follow, frame by frame; radians and metres.

@@ -1,0 +1,139 @@
+"""Demonstration sets on disk: made once by simulated capture, then read back.
+
+A set is a folder of `train/NNN.npz` and `heldout/NNN.npz` (schema mjx-hand/demonstration/1), each with its truth in
+`NNN.truth.npz` beside it. Training and held-out demonstrations come from different people, object sizes and seeds.
+"""
+
+import dataclasses
+import hashlib
+import json
+import shutil
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from envs.demonstrations.record import CaptureSettings, load_truth, record_trials, save_truth
+from envs.demonstrations.trials import perform_trials
+from envs.grasps import grasp_type
+from mjx_hand.errors import InputError
+from mjx_hand.hand.load import load_hand
+from mjx_hand.motion.demonstration import Demonstration, load_demonstration, save_demonstration
+from mjx_hand.rigid.build import build_rigid_hand
+from mjx_hand.rigid.rigid_hand import RigidHand
+
+PARTS = ("train", "heldout")
+_VERSION = 1  # of the generator: a change that makes other demonstrations of the same settings raises it
+_SHAPE_LIMIT = 2.0  # standard deviations
+
+Report = Callable[[str, float], None]  # what is being done, and the share of it done
+
+
+@dataclasses.dataclass(frozen=True)
+class SetSettings:
+    """What a demonstration set holds.
+
+    Attributes:
+        grasp: name of the grasp type.
+        people: random hand shapes in the training part.
+        heldout_people: others, in the held-out part.
+        trials: demonstrations of each person.
+        seed: of every draw; the held-out part uses the next one.
+        capture: how they are recorded.
+    """
+
+    grasp: str
+    people: int = 8
+    heldout_people: int = 4
+    trials: int = 8
+    seed: int = 0
+    capture: CaptureSettings = dataclasses.field(default_factory=CaptureSettings)
+
+    def __post_init__(self):
+        grasp_type(self.grasp)
+        for name in ("people", "heldout_people", "trials"):
+            if getattr(self, name) < 1:
+                raise InputError(f"data.{name} is {getattr(self, name)}; it must be at least 1")
+
+
+def set_folder(settings: SetSettings, root: str | Path) -> Path:
+    """Where a set of these settings lives below `root`: its name carries a digest of all settings."""
+    content = json.dumps([_VERSION, dataclasses.asdict(settings)], sort_keys=True)
+    return Path(root) / f"{settings.grasp}-{hashlib.sha256(content.encode()).hexdigest()[:10]}"
+
+
+def make_set(settings: SetSettings, root: str | Path, report: Report = lambda what, share: None) -> Path:
+    """The folder of the set, made if it is not there. It appears whole or not at all.
+
+    Raises:
+        InputError: the folder cannot be written, or the grasp fails too often.
+    """
+    folder = set_folder(settings, root)
+    if folder.is_dir():
+        return folder
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}-"))
+    except OSError as error:
+        raise InputError(f"cannot write {folder}: {error.strerror}; choose another folder for demonstrations") from None
+    try:
+        parts = dict(zip(PARTS, (settings.people, settings.heldout_people), strict=True))
+        for offset, (part, people) in enumerate(parts.items()):
+            _make_part(settings, people, settings.seed + offset * 1_000_003, temporary / part, part, report)
+        (temporary / "settings.json").write_text(json.dumps(dataclasses.asdict(settings), indent=1))
+        temporary.chmod(0o755)
+        temporary.rename(folder)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+    return folder
+
+
+def _make_part(settings: SetSettings, people: int, seed: int, folder: Path, part: str, report: Report) -> None:
+    model = load_hand()
+    grasp = grasp_type(settings.grasp)
+    rng = np.random.default_rng(seed)
+    shapes = np.clip(rng.normal(size=(people, model.num_shape)), -_SHAPE_LIMIT, _SHAPE_LIMIT)
+    hands = [build_rigid_hand(model, shape) for shape in shapes]
+    wanted = people * settings.trials
+    trials = perform_trials(
+        grasp, hands, settings.trials, seed, lambda kept, tried: report(f"performing {part} grasps", kept / wanted)
+    )
+    recorded = record_trials(
+        trials,
+        hands,
+        shapes,
+        model,
+        np.array(grasp.support),
+        grasp.name,
+        seed,
+        settings.capture,
+        progress=lambda share: report(f"fitting {part} recordings", share),
+    )
+    folder.mkdir()
+    for k, (demonstration, truth) in enumerate(recorded):
+        save_demonstration(demonstration, folder / f"{k:03d}.npz")
+        save_truth(truth, folder / f"{k:03d}.truth.npz")
+
+
+def load_part(folder: str | Path, part: str) -> list[Demonstration]:
+    """The demonstrations of one part of a set, in order.
+
+    Raises:
+        InputError: no such part, or it holds none.
+    """
+    if part not in PARTS:
+        raise InputError(f"part {part!r} is not known; valid: {', '.join(PARTS)}")
+    paths = [p for p in sorted(Path(folder, part).glob("*.npz")) if not p.name.endswith(".truth.npz")]
+    if not paths:
+        raise InputError(f"{folder}: no {part} demonstrations; delete the folder and run again to make the set anew")
+    return [load_demonstration(path) for path in paths]
+
+
+def twins(demonstrations: Sequence[Demonstration]) -> list[RigidHand]:
+    """The twin's hand for each demonstration, from the shape that was fitted to the person."""
+    model = load_hand(side=demonstrations[0].motion.side)
+    return [build_rigid_hand(model, demonstration.shape) for demonstration in demonstrations]
+
+
+__all__ = ["PARTS", "SetSettings", "load_part", "load_truth", "make_set", "set_folder", "twins"]
