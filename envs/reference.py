@@ -113,7 +113,7 @@ def _padded(rows: np.ndarray, frames: int) -> np.ndarray:
 
 def _check(demonstrations: Sequence[Demonstration]) -> None:
     if not demonstrations:
-        raise InputError("no demonstrations given; make a set with: python -m envs.demonstrations config=pinch")
+        raise InputError("no demonstrations given; make a set with envs.demonstrations.dataset.make_set")
     for what, values in (
         ("frame rates", {round(d.motion.fps, 6) for d in demonstrations}),
         ("kinds of object", {d.object.kind for d in demonstrations}),

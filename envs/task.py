@@ -38,6 +38,7 @@ class Task:
     ahead: tuple[int, ...] = (1, 4, 12)
 
     def __post_init__(self):
+        object.__setattr__(self, "ahead", tuple(self.ahead))  # configuration files have lists
         positive = ("substeps", "wrist_move", "wrist_turn", "finger", "position_sharpness", "rotation_sharpness")
         for name in (*positive, "lost_at"):
             value = getattr(self, name)
@@ -52,4 +53,6 @@ class Task:
             if not getattr(self, name) >= 0:
                 raise InputError(f"task.{name} is {getattr(self, name)}; it must not be negative")
         if not self.ahead or any(k < 1 for k in self.ahead):
-            raise InputError(f"task.ahead is {self.ahead}; it must list frames ahead, each at least 1, such as [1,4,12]")
+            raise InputError(
+                f"task.ahead is {self.ahead}; it must list frames ahead, each at least 1, such as [1,4,12]"
+            )

@@ -1,7 +1,7 @@
 """Demonstration sets on disk: made once by simulated capture, then read back.
 
-A set is a folder of `train/NNN.npz` and `heldout/NNN.npz` (schema mjx-hand/demonstration/1), each with its truth in
-`NNN.truth.npz` beside it. Training and held-out demonstrations come from different people, object sizes and seeds.
+A set is a folder of `train/NNN.npz` and `heldout/NNN.npz` (schema mjx-hand/demonstration/1). Beside each stand the motion
+that was fitted to its markers, `NNN.motion.npz` (which `mjx-hand retarget` reads), and its truth, `NNN.truth.npz`. Training and held-out demonstrations come from different people, object sizes and seeds.
 """
 
 import dataclasses
@@ -14,12 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
-from envs.demonstrations.record import CaptureSettings, load_truth, record_trials, save_truth
+from envs.demonstrations.record import CaptureSettings, record_trials, save_truth
 from envs.demonstrations.trials import perform_trials
 from envs.grasps import grasp_type
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion.demonstration import Demonstration, load_demonstration, save_demonstration
+from mjx_hand.motion.motion import save_motion
 from mjx_hand.rigid.build import build_rigid_hand
 from mjx_hand.rigid.rigid_hand import RigidHand
 
@@ -111,7 +112,8 @@ def _make_part(settings: SetSettings, people: int, seed: int, folder: Path, part
         progress=lambda share: report(f"fitting {part} recordings", share),
     )
     folder.mkdir()
-    for k, (demonstration, truth) in enumerate(recorded):
+    for k, (motion, demonstration, truth) in enumerate(recorded):
+        save_motion(motion, folder / f"{k:03d}.motion.npz")
         save_demonstration(demonstration, folder / f"{k:03d}.npz")
         save_truth(truth, folder / f"{k:03d}.truth.npz")
 
@@ -124,7 +126,7 @@ def load_part(folder: str | Path, part: str) -> list[Demonstration]:
     """
     if part not in PARTS:
         raise InputError(f"part {part!r} is not known; valid: {', '.join(PARTS)}")
-    paths = [p for p in sorted(Path(folder, part).glob("*.npz")) if not p.name.endswith(".truth.npz")]
+    paths = [p for p in sorted(Path(folder, part).glob("*.npz")) if p.stem.isdigit()]
     if not paths:
         raise InputError(f"{folder}: no {part} demonstrations; delete the folder and run again to make the set anew")
     return [load_demonstration(path) for path in paths]
@@ -134,6 +136,3 @@ def twins(demonstrations: Sequence[Demonstration]) -> list[RigidHand]:
     """The twin's hand for each demonstration, from the shape that was fitted to the person."""
     model = load_hand(side=demonstrations[0].motion.side)
     return [build_rigid_hand(model, demonstration.shape) for demonstration in demonstrations]
-
-
-__all__ = ["PARTS", "SetSettings", "load_part", "load_truth", "make_set", "set_folder", "twins"]

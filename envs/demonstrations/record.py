@@ -6,6 +6,7 @@ What comes out is what a laboratory would have: the twin never sees the true ang
 import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import jax
 import numpy as np
@@ -73,6 +74,14 @@ class Truth:
     shape: Float[np.ndarray, "s"]
 
 
+class Recorded(NamedTuple):
+    """One recorded trial: the motion that was fitted to its markers, what the twin is to replay, and the truth."""
+
+    motion: Motion
+    demonstration: Demonstration
+    truth: Truth
+
+
 def record_trials(
     trials: Sequence[Trial],
     hands: Sequence[RigidHand],
@@ -83,7 +92,7 @@ def record_trials(
     seed: int,
     settings: CaptureSettings | None = None,
     progress: Callable[[float], None] | None = None,
-) -> list[tuple[Demonstration, Truth]]:
+) -> list[Recorded]:
     """Record, fit and project each trial.
 
     Args:
@@ -130,7 +139,7 @@ def record_trials(
             grasp=grasp,
             source=source,
         )
-        out.append((demonstration, truth))
+        out.append(Recorded(replace(fitted, source=source), demonstration, truth))
     return out
 
 

@@ -80,3 +80,26 @@ def clock(seconds: float) -> str:
     if whole < 3600:
         return f"{whole // 60} min {whole % 60:02d} s"
     return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+
+
+@contextlib.contextmanager
+def shares() -> Iterator[Callable[[str, float], None]]:
+    """A context in which `report(what, share)` says what is being done and what share of it, 0 to 1, is done.
+
+    Each new `what` starts a bar of its own.
+    """
+    with contextlib.ExitStack() as stack:
+        current: dict[str, Callable[[int], None]] = {}
+        done: dict[str, int] = {}
+
+        def report(what: str, share: float) -> None:
+            if what not in current:
+                stack.close()
+                current.clear()
+                current[what] = stack.enter_context(counter(100, what))
+                done[what] = 0
+            percent = min(int(100 * share), 100)
+            current[what](max(percent - done[what], 0))
+            done[what] = max(percent, done[what])
+
+        yield report

@@ -1,0 +1,175 @@
+"""`make demo`: a recording is retargeted, a pinch policy is trained, and a report shows what came of it.
+
+    python -m train.demo [config=pinch_demo] [any override of train.ppo]
+
+With a `config` of its own it makes the same report for any experiment.
+"""
+
+import platform
+import sys
+import time
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+
+import jax
+import numpy as np
+
+from envs.demonstrations.dataset import set_folder
+from envs.metrics import position_error
+from envs.published import PAPER
+from mjx_hand.cli.retarget import retarget
+from mjx_hand.hand.joints import FINGERS, LINKS
+from mjx_hand.hand.load import load_hand
+from mjx_hand.motion import load_motion_file
+from mjx_hand.retarget.sequence import RetargetErrors, retarget_errors, retarget_sequence, rigid_hand_of
+from mjx_hand.view import plots
+from mjx_hand.view.progress import clock
+from mjx_hand.view.renderer import RendererUnavailable
+from mjx_hand.view.report import Headline, Plot, Report, write_report
+from train.config import Config, command
+from train.evaluate import POLICY, REPLAY, ZERO, Results, evaluate_checkpoint, show, tables, write_results
+from train.experiment import make_world
+from train.ppo import Point, train
+from train.video import side_by_side
+
+
+def main(config: Config) -> None:
+    """The whole chain, then `report.html` in the experiment's folder."""
+    out = Path(config.out)
+    timings: list[tuple[str, float]] = []
+
+    def stage(name: str, work: Callable) -> object:  # type: ignore[type-arg]
+        print(f"\n== {name}", flush=True)
+        began = time.monotonic()
+        result = work()
+        timings.append((name, time.monotonic() - began))
+        return result
+
+    world = stage(
+        "demonstrations: performed, recorded with markers, fitted, projected", lambda: make_world(config, "train")
+    )
+    recording = set_folder(config.data, config.demonstrations) / "heldout" / "000.motion.npz"
+    errors = stage("retargeting a recording", lambda: _retarget(recording, out / "retargeted.npz"))
+    points = stage("training", lambda: train(config, world))  # type: ignore[arg-type]
+    results = stage("evaluating on held-out demonstrations", lambda: evaluate_checkpoint(config))
+    write_results(results, config)  # type: ignore[arg-type]
+    video, missing = stage("video", lambda: _video(results, out / "twin.mp4"))  # type: ignore[arg-type,misc]
+    report = _report(config, errors, points, results, video, missing, timings)  # type: ignore[arg-type]
+    write_report(out / "report.html", report)
+    for table in tables(results, config):  # type: ignore[arg-type]
+        show(table)
+    print(f"\nreport: {(out / 'report.html').resolve()}  (open it in a browser)")
+    print(f"all results: {out.resolve()}")
+
+
+def _retarget(recording: Path, out: Path) -> dict[str, RetargetErrors]:
+    """Run `mjx-hand retarget`, and collect the errors of the exact projection and the paper's."""
+    retarget(recording, out)
+    motion = load_motion_file(recording)
+    hand = rigid_hand_of(motion, load_hand(side=motion.side))
+    return {
+        method: retarget_errors(motion, retarget_sequence(motion, hand, method), hand) for method in ("exact", "paper")
+    }
+
+
+def _video(results: Results, path: Path) -> tuple[Path | None, str]:
+    """The held-out rollout of median tracking error, or why there is none."""
+    scores = results.evaluations[POLICY].scores["tracking_error_cm"]
+    median = int(np.argsort(scores)[len(scores) // 2])
+    try:
+        side_by_side(results.world, results.rollouts[POLICY], median, path)
+    except RendererUnavailable as error:
+        return None, str(error)
+    return path, ""
+
+
+def _report(
+    config: Config,
+    errors: dict[str, RetargetErrors],
+    points: list[Point],
+    results: Results,
+    video: Path | None,
+    missing: str,
+    timings: list[tuple[str, float]],
+) -> Report:
+    rows = {title: evaluation.rows() for title, evaluation in results.evaluations.items()}
+    scores, failures = tables(results, config)
+    paper = PAPER.get(config.data.grasp)
+    joints = [name.replace("1", " base").replace("2", " middle").replace("3", " end") for name in LINKS[1:]]
+    exact = errors["exact"]
+    tips = {finger: 1e3 * exact.tip_position[exact.valid, k] for k, finger in enumerate(FINGERS)}
+    beside = f"paper: {100 * paper.success:.1f} %, success not defined" if paper else ""
+    return Report(
+        title=f"mjx-hand: {config.name}",
+        task=(
+            "A simulated hand, built from markers recorded on a person, replays that person's "
+            f"{config.data.grasp} grasps: reach, grasp, lift, carry, turn and hold an object in physics. "
+            "The policy adds small corrections to the recorded motion; replayed alone, the recording drops the object."
+        ),
+        headlines=(
+            Headline("held-out success", f"{100 * rows[POLICY]['manip_trans_object']:.1f} %", beside),
+            Headline(
+                "tracking error", f"{rows[POLICY]['tracking_error_cm']:.2f} cm", "mean over all held-out rollouts"
+            ),
+            Headline(
+                "without learning",
+                f"{100 * rows[REPLAY]['manip_trans_object']:.0f} %",
+                f"demonstration alone; {100 * rows[ZERO]['manip_trans_object']:.0f} % with fingers pressed",
+            ),
+            Headline("training", clock(points[-1].seconds), f"{points[-1].steps:,} control steps"),
+        ),
+        video=video,
+        video_missing=missing,
+        video_caption="Left the demonstration, right the twin: the held-out rollout of median tracking error.",
+        learning_curve=Plot(
+            plots.learning_curve(
+                np.array([p.steps for p in points]),
+                np.array([p.success for p in points]),
+                baseline=points[0].success if points[0].steps == 0 else None,
+            ),
+            "Share of training demonstrations tracked from frame 0, unassisted. The level is the untrained policy.",
+        ),
+        tracking=Plot(
+            plots.error_over_time(
+                results.world.env.fps,
+                {title: (100 * position_error(r), r.counted) for title, r in results.rollouts.items()},
+                limit=3.0,
+            ),
+            "Distance of the object from where the demonstration has it, on held-out demonstrations.",
+        ),
+        success=scores,
+        failures=failures,
+        projection=Plot(
+            plots.joint_errors(joints, {m: np.rad2deg(e.rotation[e.valid]) for m, e in errors.items()}),
+            "What 20 hinges cannot follow of one recording's 15 rotations, by the exact projection and the paper's.",
+        ),
+        retargeting=Plot(
+            plots.retarget_errors(tips, label="finger-tip error (mm)"),
+            "Where that puts the finger tips, against the recording's own chain of rotations.",
+        ),
+        how=[
+            *((name, clock(seconds)) for name, seconds in timings),
+            ("engine", f"{results.world.env.engine.name}, {config.ppo.num_envs} worlds"),
+            ("seed", str(config.seed)),
+            ("machine", f"{_processor()}, {len(jax.devices())} {jax.default_backend()} device(s)"),
+            ("versions", ", ".join(f"{name} {version(name)}" for name in ("mjx-hand", "mujoco", "jax", "brax"))),
+        ],
+        commands=[f"python -m train.demo config={config.name}", f"python -m train.evaluate config={config.name}"],
+    )
+
+
+def _processor() -> str:
+    """The processor's name, as far as the system tells."""
+    information = Path("/proc/cpuinfo")
+    if information.is_file():
+        for line in information.read_text().splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    return platform.processor() or platform.machine()
+
+
+if __name__ == "__main__":
+    if not any(argument.startswith("config=") for argument in sys.argv[1:]):
+        sys.argv.insert(1, "config=pinch_demo")
+    command(main)

@@ -1,0 +1,55 @@
+"""What training, evaluation and play share: the demonstrations of an experiment, their twins, and environments."""
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+
+from envs.demonstrations.dataset import load_part, make_set, twins
+from envs.tracking import TrackingEnv
+from mjx_hand.errors import InputError
+from mjx_hand.motion.demonstration import Demonstration
+from mjx_hand.rigid.rigid_hand import RigidHand
+from mjx_hand.view.progress import shares
+from train.checkpoint import Checkpoint, load_checkpoint
+from train.config import Config
+
+
+@dataclasses.dataclass(frozen=True)
+class World:
+    """Demonstrations, the twin's hand for each, and the environment over them."""
+
+    demonstrations: Sequence[Demonstration]
+    hands: Sequence[RigidHand]
+    env: TrackingEnv
+
+
+def make_world(config: Config, part: str, *, press: bool = True) -> World:
+    """The environment over one part ("train", "heldout") of the experiment's demonstrations, made where missing.
+
+    Args:
+        config: the experiment.
+        part: which part.
+        press: False replays demonstrations as they are, without the forces that the reference adds.
+    """
+    with shares() as report:
+        folder = make_set(config.data, config.demonstrations, report)
+    demonstrations = load_part(folder, part)
+    hands = twins(demonstrations)
+    task = config.task if press else dataclasses.replace(config.task, grip_force=0.0)
+    return World(demonstrations, hands, TrackingEnv(demonstrations, hands, config.engine, task))
+
+
+def chosen_checkpoint(config: Config, observation_size: int) -> Checkpoint:
+    """The checkpoint to evaluate: `checkpoint=FILE`, or the best of the experiment's folder.
+
+    Raises:
+        InputError: there is none, or it was trained on other observations.
+    """
+    path = Path(config.checkpoint) if config.checkpoint else Path(config.out) / "best.npz"
+    checkpoint = load_checkpoint(path)
+    if checkpoint.observation_size != observation_size:
+        raise InputError(
+            f"{path}: reads {checkpoint.observation_size} observations, this task gives {observation_size}; "
+            "use the task options it was trained with, or train again"
+        )
+    return checkpoint

@@ -1,0 +1,41 @@
+"""The policy and value networks, and policies as plain functions of their parameters."""
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import jax
+from brax.training.agents.ppo import networks
+from jaxtyping import Array, Float
+
+from train.config import Ppo
+
+
+def network_factory(ppo: Ppo) -> Callable[..., networks.PPONetworks]:
+    """What Brax PPO makes its networks with.
+
+    Actions are normal with a deviation that does not depend on the state and starts small: a residual that begins as
+    loud noise shakes the object out of the hand before anything can be learned from holding it.
+    """
+    return functools.partial(
+        networks.make_ppo_networks,
+        policy_hidden_layer_sizes=ppo.policy_layers,
+        value_hidden_layer_sizes=ppo.value_layers,
+        distribution_type="normal",
+        noise_std_type="log",
+        init_noise_std=ppo.initial_std,
+    )
+
+
+def deterministic_policy(
+    ppo: Ppo, observation_size: int, action_size: int
+) -> Callable[[Any, Float[Array, "n o"]], Float[Array, "n 26"]]:
+    """The policy's mean action as a function of (policy parameters, observations)."""
+    made = network_factory(ppo)(observation_size, action_size)
+    infer = networks.make_inference_fn(made)
+
+    def act(parameters: Any, observation: Float[Array, "n o"]) -> Float[Array, "n 26"]:
+        # Observations are scaled by hand, so Brax's normaliser has nothing to say.
+        return infer((None, parameters, None), deterministic=True)(observation, jax.random.key(0))[0]
+
+    return act
