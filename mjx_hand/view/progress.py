@@ -52,9 +52,12 @@ class _Lines:
         self.total, self.description = total, description
         self.done = 0
         self.start = self.written = time.monotonic()
+        self.first: tuple[float, int] | None = None
 
     def advance(self, count: int) -> None:
         self.done += count
+        # The first piece of work often holds the compilation: what is left is judged by the pace after it.
+        self.first = self.first or (time.monotonic(), self.done)
         if time.monotonic() - self.written >= SECONDS_BETWEEN_LINES:
             self.write()
 
@@ -64,10 +67,17 @@ class _Lines:
         if self.total is None or self.done >= self.total:
             line = f"{self.description}: {self.done} in {clock(took)}"
         else:
-            left = took / self.done * (self.total - self.done) if self.done else None
+            left = self._left(self.total)
             line = f"{self.description}: {self.done}/{self.total} in {clock(took)}"
             line += f", about {clock(left)} left" if left is not None else ""
         print(line, flush=True)
+
+    def _left(self, total: int) -> float | None:
+        """Seconds left at the pace since the first piece; None before a second one is done."""
+        if self.first is None or self.done <= self.first[1]:
+            return None
+        since, done = self.first
+        return (self.written - since) / (self.done - done) * (total - self.done)
 
 
 def clock(seconds: float) -> str:
