@@ -8,11 +8,11 @@ parallel. Engines are pure functions, written for one world and mapped with `jax
 import importlib
 import importlib.util
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import jax
 import mujoco
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Float, Int
 
 from mjx_hand.errors import InputError
 from mjx_hand.pytree import pytree
@@ -40,6 +40,7 @@ class PhysicsState:
     unstable: Float[Array, "*b"]
 
 
+@runtime_checkable
 class Engine(Protocol):
     """A physics engine over a family of models.
 
