@@ -1,4 +1,4 @@
-"""Checkpoints: network parameters as named arrays in one `.npz`, without pickle, with what is needed to use them again."""
+"""Checkpoints: network parameters as named arrays in one `.npz`, without pickle, and what it takes to use them."""
 
 import dataclasses
 from collections.abc import Mapping

@@ -1,7 +1,8 @@
-"""The typed configuration of an experiment, composed by Hydra from `configs/` and checked before anything is compiled."""
+"""The typed configuration of an experiment, composed by Hydra from `configs/`, checked before anything is compiled."""
 
 import dataclasses
 import difflib
+import math
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -51,10 +52,14 @@ class Ppo:
     def __post_init__(self):
         for name in ("policy_layers", "value_layers"):  # configuration files have lists
             object.__setattr__(self, name, tuple(getattr(self, name)))
+            if any(size < 1 for size in getattr(self, name)):
+                raise InputError(f"ppo.{name} is {list(getattr(self, name))}; every layer needs at least 1 unit")
         whole = ("num_timesteps", "num_envs", "unroll_length", "num_minibatches", "num_updates_per_batch")
         for name in (*whole, "learning_rate", "clipping_epsilon", "max_grad_norm", "initial_std"):
-            if not getattr(self, name) > 0:
-                raise InputError(f"ppo.{name} is {getattr(self, name)}; it must be above 0")
+            if not 0 < getattr(self, name) < math.inf:
+                raise InputError(f"ppo.{name} is {getattr(self, name)}; it must be a number above 0")
+        if not 0 <= self.entropy_cost < math.inf:
+            raise InputError(f"ppo.entropy_cost is {self.entropy_cost}; it must be a number that is not negative")
         for name in ("discounting", "gae_lambda"):
             if not 0 < getattr(self, name) <= 1:
                 raise InputError(f"ppo.{name} is {getattr(self, name)}; it must be above 0 and at most 1")
@@ -80,6 +85,8 @@ class Checks:
     def __post_init__(self):
         if self.every < 1:
             raise InputError(f"checks.every is {self.every}; it must be at least 1 step")
+        if math.isnan(self.stop_at):
+            raise InputError("checks.stop_at is nan; give a share such as 0.97, or 2 to never stop early")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -139,8 +146,8 @@ def to_config(composed: DictConfig) -> Config:
     return config
 
 
-def command(task: Callable[[Config], None]) -> None:
-    """Run `task` with the configuration of this process's arguments; Hydra's own flags (`--multirun`, `--cfg job`) work.
+def command(task: Callable[[Config], object]) -> None:
+    """Run `task` with the configuration of this process's arguments; Hydra's own flags (`--cfg job`) work too.
 
     Input that cannot be used ends the process with one line and status 2.
     """
@@ -174,11 +181,14 @@ def _store_schema() -> None:
 
 
 def _make_writable(node: Any) -> None:
-    if isinstance(node, DictConfig | ListConfig):
+    if isinstance(node, DictConfig):
         OmegaConf.set_readonly(node, False)
-        children = node.keys() if isinstance(node, DictConfig) else range(len(node))
-        for key in children:
-            _make_writable(node._get_node(key))
+        for name in node:
+            _make_writable(node._get_node(name))
+    elif isinstance(node, ListConfig):
+        OmegaConf.set_readonly(node, False)
+        for index in range(len(node)):
+            _make_writable(node._get_node(index))
 
 
 def _check_key(base: DictConfig, key: str) -> None:

@@ -5,10 +5,11 @@
 With a `config` of its own it makes the same report for any experiment.
 """
 
+import contextlib
 import platform
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
 
@@ -39,28 +40,32 @@ def main(config: Config) -> None:
     out = Path(config.out)
     timings: list[tuple[str, float]] = []
 
-    def stage(name: str, work: Callable) -> object:  # type: ignore[type-arg]
-        print(f"\n== {name}", flush=True)
-        began = time.monotonic()
-        result = work()
-        timings.append((name, time.monotonic() - began))
-        return result
-
-    world = stage(
-        "demonstrations: performed, recorded with markers, fitted, projected", lambda: make_world(config, "train")
-    )
+    with _stage("demonstrations: performed, recorded with markers, fitted, projected", timings):
+        world = make_world(config, "train")
     recording = set_folder(config.data, config.demonstrations) / "heldout" / "000.motion.npz"
-    errors = stage("retargeting a recording", lambda: _retarget(recording, out / "retargeted.npz"))
-    points = stage("training", lambda: train(config, world))  # type: ignore[arg-type]
-    results = stage("evaluating on held-out demonstrations", lambda: evaluate_checkpoint(config))
-    write_results(results, config)  # type: ignore[arg-type]
-    video, missing = stage("video", lambda: _video(results, out / "twin.mp4"))  # type: ignore[arg-type,misc]
-    report = _report(config, errors, points, results, video, missing, timings)  # type: ignore[arg-type]
-    write_report(out / "report.html", report)
-    for table in tables(results, config):  # type: ignore[arg-type]
+    with _stage("retargeting a recording", timings):
+        errors = _retarget(recording, out / "retargeted.npz")
+    with _stage("training", timings):
+        points = train(config, world)
+    with _stage("evaluating on held-out demonstrations", timings):
+        results = evaluate_checkpoint(config)
+        write_results(results, config)
+    with _stage("video", timings):
+        video, missing = _video(results, out / "twin.mp4")
+    write_report(out / "report.html", _report(config, errors, points, results, video, missing, timings))
+    for table in tables(results, config):
         show(table)
     print(f"\nreport: {(out / 'report.html').resolve()}  (open it in a browser)")
     print(f"all results: {out.resolve()}")
+
+
+@contextlib.contextmanager
+def _stage(name: str, timings: list[tuple[str, float]]) -> Iterator[None]:
+    """Announce a stage of the run, and note how many seconds it took."""
+    print(f"\n== {name}", flush=True)
+    began = time.monotonic()
+    yield
+    timings.append((name, time.monotonic() - began))
 
 
 def _retarget(recording: Path, out: Path) -> dict[str, RetargetErrors]:

@@ -4,10 +4,11 @@ Writes to the experiment's `out` folder: `best.npz` and `last.npz` (checkpoints)
 `config.yaml`, and TensorBoard logs.
 """
 
+import contextlib
 import dataclasses
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -71,10 +72,8 @@ def train(config: Config, world: World | None = None) -> list[Point]:
     )
     with SummaryWriter(str(out / "tensorboard")) as writer, counter(config.ppo.num_timesteps, "training") as advance:
         watch = _Watch(config, world, out, writer, advance)
-        try:
+        with contextlib.suppress(_Solved):
             _brax(config, world, watch)
-        except _Solved:
-            pass
     return watch.points
 
 
@@ -124,7 +123,7 @@ class _Watch:
         policy = deterministic_policy(config.ppo, env.observation_size, env.action_size)
         self.roll_out = make_roll_out(env, world.hands, policy)
 
-    def log(self, steps: int, metrics: dict[str, Any]) -> None:
+    def log(self, steps: int, metrics: Mapping[str, Any]) -> None:
         """Training metrics, a few times a second of work."""
         self.advance(min(int(steps), self.config.ppo.num_timesteps) - self.seen)
         self.seen = min(int(steps), self.config.ppo.num_timesteps)
@@ -180,4 +179,4 @@ def _write_curve(points: list[Point], path: Path) -> None:
 
 
 if __name__ == "__main__":
-    command(train)  # type: ignore[arg-type]
+    command(train)

@@ -16,7 +16,6 @@ from mjx_hand.rigid.build import build_rigid_hand
 from mjx_hand.rigid.rigid_hand import RigidHand, chain, joint_rotations, tip_positions
 from mjx_hand.rotations import geodesic_angle
 
-
 _FRAMES = 256  # sequences are padded to a multiple of this, so that most lengths share a compilation
 
 

@@ -1,8 +1,5 @@
 """A rigid hand as a MuJoCo model, in memory (`MjSpec`) or on disk (MJCF and meshes)."""
 
-# MuJoCo's classes come from compiled code without type stubs.
-# pyright: reportAttributeAccessIssue=false
-
 from pathlib import Path
 
 import mujoco

@@ -1,8 +1,5 @@
 """Where the camera of a video stands: it glides after the object and looks at the hand from the thumb's side."""
 
-# MuJoCo's classes come from compiled code without type stubs.
-# pyright: reportAttributeAccessIssue=false
-
 import dataclasses
 
 import mujoco

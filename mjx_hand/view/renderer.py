@@ -1,8 +1,5 @@
 """Opening MuJoCo's off-screen renderer wherever it is, with or without a display."""
 
-# MuJoCo's classes come from compiled code without type stubs.
-# pyright: reportAttributeAccessIssue=false
-
 import contextlib
 import ctypes
 import importlib

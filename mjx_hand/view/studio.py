@@ -1,8 +1,5 @@
 """Light and backdrop for pictures of any scene: a key light with soft shadows, a fill light, an even background."""
 
-# MuJoCo's classes come from compiled code without type stubs.
-# pyright: reportAttributeAccessIssue=false
-
 import copy
 
 import mujoco

@@ -1,8 +1,5 @@
 """Videos of a scene: off-screen pictures of a row of qpos, captions, two takes side by side, and H.264 files."""
 
-# MuJoCo's classes come from compiled code without type stubs.
-# pyright: reportAttributeAccessIssue=false
-
 import contextlib
 import itertools
 from collections.abc import Generator, Iterable, Sequence

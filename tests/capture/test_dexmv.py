@@ -64,6 +64,7 @@ def test_what_the_motion_says_of_itself(file):
     assert (motion.num_frames, motion.fps, motion.side, motion.valid.all()) == (122, 25.0, "right", True)
     assert motion.shape.shape == (10,)
     assert "DexMV" in motion.source
+    assert motion.link_offset is not None
     # MANO's hand frame: fingers along -x, little finger to thumb along +z, whatever the camera sees.
     knuckles = dict(zip(FINGERS, motion.link_offset[1::3], strict=True))
     assert all(knuckles[f][0] < -0.05 for f in FINGERS if f != "thumb")
@@ -77,6 +78,8 @@ def test_medians_resist_a_wild_frame(file, arrays, tmp_path):
     np.savez(tmp_path / "wild.npz", **wild)
     motion, sound = load_motion(tmp_path / "wild.npz"), load_motion(file)
     np.testing.assert_allclose(motion.shape, sound.shape, atol=0.02)
+    assert motion.link_offset is not None
+    assert sound.link_offset is not None
     np.testing.assert_allclose(motion.link_offset, sound.link_offset, atol=1e-4)
 
 

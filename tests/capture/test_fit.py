@@ -53,7 +53,7 @@ def test_a_fit_of_one_is_the_fit_of_many(hand, marker_set, noisy):
 def test_moving_the_world_moves_the_wrist_and_nothing_else(hand, marker_set, noisy, seed):
     case = noisy[0]
     rng = np.random.default_rng(seed)
-    turn, shift = Rotation.random(random_state=rng), rng.normal(size=3) * 5
+    turn, shift = Rotation.random(rng=rng), rng.normal(size=3) * 5
     seen = case.recording.visible[..., None]
     moved = dataclasses.replace(
         case.recording, positions=np.where(seen, case.recording.positions @ turn.as_matrix().T + shift, 0.0)

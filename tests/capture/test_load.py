@@ -58,7 +58,7 @@ def test_refusals_name_what_was_found_and_what_is_read(tmp_path):
     (tmp_path / "text.npz").write_text("not an archive")
     (tmp_path / "marks.c3d").write_bytes(b"\x02P")
     (tmp_path / "pose.pkl").write_bytes(b"\x80\x04N.")
-    np.savez(tmp_path / "other.npz", **{f"a{k}": np.zeros(2) for k in range(8)})
+    np.savez(tmp_path / "other.npz", allow_pickle=False, **{f"a{k}": np.zeros(2) for k in range(8)})
     np.savez(tmp_path / "pickled.npz", a=np.array([{}], dtype=object))
     expected = {
         "gone.npz": "no such file",

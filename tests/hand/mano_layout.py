@@ -67,10 +67,13 @@ def chumpy() -> Iterator[types.SimpleNamespace]:
             del sys.modules[name]
 
 
-class _Python2Pickler(pickle._Pickler):
+_Pickler: Any = pickle._Pickler  # the one in Python, whose methods type stubs do not list
+
+
+class _Python2Pickler(_Pickler):
     """Writes bytes as Python 2 wrote its strings."""
 
-    dispatch: ClassVar = dict(pickle._Pickler.dispatch)
+    dispatch: ClassVar = dict(_Pickler.dispatch)
 
     def save_bytes(self, data: bytes) -> None:
         self.write(pickle.BINSTRING + struct.pack("<i", len(data)) + data)

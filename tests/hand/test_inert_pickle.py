@@ -167,7 +167,7 @@ def test_python2_strings_become_arrays() -> None:
 )
 def test_contradictory_sparse_matrices_are_refused(part: str, value: Any) -> None:
     matrix = csc_matrix(np.eye(2))
-    matrix.__dict__[part] = value
+    setattr(matrix, part, value)
     record = inert_pickle.read(pickle.dumps({"m": matrix}), "file")["m"]
     with pytest.raises((ValueError, TypeError)):
         inert_pickle.array(record)

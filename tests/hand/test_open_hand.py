@@ -161,7 +161,7 @@ def test_each_link_owns_one_patch_with_simple_borders() -> None:
 def test_extreme_shapes_are_still_hands(component: int, amount: float) -> None:
     beta = np.zeros(10, np.float32)
     beta[component] = amount
-    points = vertices(*beta)
+    points = vertices(*beta.tolist())
     mesh, mean = surface(points), surface(RIGHT.template)
     assert mesh.is_watertight
     assert 140e-6 < mesh.volume < 600e-6

@@ -16,13 +16,13 @@ def motions(draw: st.DrawFn, max_frames: int = 8) -> Motion:
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     valid = np.array(draw(st.lists(st.booleans(), min_size=frames, max_size=frames)))
     valid[draw(st.integers(0, frames - 1))] = True
-    rotations = Rotation.random(frames * 15, random_state=rng).as_matrix().reshape(frames, 15, 3, 3)
+    rotations = Rotation.random(frames * 15, rng=rng).as_matrix().reshape(frames, 15, 3, 3)
     rotations[~valid] = np.eye(3)
     return Motion(
         fps=draw(st.floats(0.5, 500)),
         rotations=rotations,
         wrist_position=rng.normal(size=(frames, 3)),
-        wrist_quaternion=Rotation.random(frames, random_state=rng).as_quat(scalar_first=True),
+        wrist_quaternion=Rotation.random(frames, rng=rng).as_quat(scalar_first=True),
         shape=rng.normal(size=draw(st.integers(0, 12))),
         valid=valid,
         link_offset=draw(st.sampled_from([None, rng.normal(size=(16, 3))])),

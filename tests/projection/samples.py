@@ -12,7 +12,7 @@ def about(axis, angle):
 
 
 def random_rotations(count, seed):
-    return Rotation.random(count, random_state=seed).as_matrix()
+    return Rotation.random(count, rng=np.random.default_rng(seed)).as_matrix()
 
 
 def axis_pairs(count, seed, overlap):

@@ -79,13 +79,18 @@ def test_urdf_states_the_same_limits_and_is_well_formed(rigid, folder):
         np.testing.assert_allclose([limit.lower, limit.upper], [rigid.hinge_lower[k], rigid.hinge_upper[k]], rtol=1e-6)
         assert limit.effort > 0
         assert limit.velocity > 0
+    masses = []
     for link in robot.robot.links:
-        assert link.inertial.mass > 0
-        moments = np.linalg.eigvalsh(link.inertial.inertia)
+        inertial = link.inertial
+        assert inertial is not None
+        assert inertial.mass is not None
+        assert inertial.inertia is not None
+        assert inertial.mass > 0
+        masses.append(inertial.mass)
+        moments = np.linalg.eigvalsh(inertial.inertia)
         assert moments[0] > 0
         assert moments[2] <= moments[0] + moments[1] + 1e-15
-    mass = sum(link.inertial.mass for link in robot.robot.links)
-    np.testing.assert_allclose(mass, rigid.link_mass.sum(), rtol=1e-3)
+    np.testing.assert_allclose(sum(masses), rigid.link_mass.sum(), rtol=1e-3)
 
 
 def test_written_meshes_are_watertight_and_relative(rigid, folder):

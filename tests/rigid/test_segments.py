@@ -52,7 +52,7 @@ def test_inertia_agrees_with_a_sampled_solid(rigid):
     link = 2
     mesh = trimesh.Trimesh(rigid.mesh_vertices[link], rigid.mesh_faces[link], process=False)
     rng = np.random.default_rng(1)
-    points = rng.uniform(*mesh.bounds, (4000, 3))
+    points = rng.uniform(mesh.bounds[0], mesh.bounds[1], (4000, 3))
     # Winding number by solid angles: no ray-casting backend needed.
     a, b, c = np.moveaxis(mesh.triangles[None] - points[:, None, None], 2, 0)
     la, lb, lc = (np.linalg.norm(v, axis=-1) for v in (a, b, c))
@@ -69,7 +69,7 @@ def test_inertia_agrees_with_a_sampled_solid(rigid):
 def test_every_link_is_one_patch(open_hand):
     labels = face_links(open_hand)
     assert set(labels.tolist()) == set(range(16))
-    pairs = trimesh.graph.face_adjacency(open_hand.faces)
+    pairs = np.asarray(trimesh.graph.face_adjacency(open_hand.faces))
     same = pairs[labels[pairs[:, 0]] == labels[pairs[:, 1]]]
     assert len(trimesh.graph.connected_components(same, nodes=np.arange(len(labels)))) == 16
 

@@ -4,6 +4,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.path import Path
 from PIL import Image
 
 from mjx_hand.errors import InputError
@@ -17,12 +19,16 @@ def line(figure: Figure, label: str) -> np.ndarray:
     return np.asarray(found.get_xydata())
 
 
+def corners(path: Path) -> np.ndarray:
+    return np.asarray(path.vertices)
+
+
 def test_learning_curve_shows_the_mean_of_the_seeds_and_the_baseline():
     steps, values = np.array([1e5, 2e5, 3e5]), np.array([[0.1, 0.5, 0.9], [0.3, 0.5, 0.7]])
     figure = plots.learning_curve(steps, values, baseline=0.25)
     shown = line(figure, "policy, mean of 2 seeds")
     np.testing.assert_allclose(shown, [[1e5, 0.2], [2e5, 0.5], [3e5, 0.8]])
-    band = figure.axes[0].collections[0].get_paths()[0].vertices
+    band = corners(figure.axes[0].collections[0].get_paths()[0])
     for corner in ([1e5, 0.1], [1e5, 0.3], [3e5, 0.7], [3e5, 0.9]):
         assert np.isclose(band, corner).all(axis=1).any()
     np.testing.assert_allclose(line(figure, "zero residual")[:, 1], 0.25)
@@ -42,7 +48,7 @@ def test_error_over_time_leaves_out_what_is_not_counted():
     expected = [np.median(values[counted[:, k], k]) for k in range(16)]
     np.testing.assert_allclose(line(figure, "policy"), np.c_[np.arange(16) / 50, expected])
     lowest, highest = (
-        f([c.get_paths()[0].vertices[:, 1] for c in figure.axes[0].collections]) for f in (np.min, np.max)
+        f([corners(c.get_paths()[0])[:, 1] for c in figure.axes[0].collections]) for f in (np.min, np.max)
     )
     assert lowest >= values.min()
     assert highest <= values.max()
@@ -51,9 +57,9 @@ def test_error_over_time_leaves_out_what_is_not_counted():
 def test_joint_errors_are_means_with_whiskers_to_the_95th_percentile():
     errors = {"a": RANDOM.random((100, 3)), "b": RANDOM.random((100, 3))}
     figure = plots.joint_errors(["index1", "index2", "thumb1"], errors)
-    heights = [bar.get_height() for bar in figure.axes[0].patches]
+    heights = [bar.get_height() for bar in figure.axes[0].patches if isinstance(bar, Rectangle)]
     np.testing.assert_allclose(heights, np.r_[errors["a"].mean(axis=0), errors["b"].mean(axis=0)])
-    tops = [whisker.vertices[1, 1] for whisker in figure.axes[0].collections[0].get_paths()]
+    tops = [corners(whisker)[1, 1] for whisker in figure.axes[0].collections[0].get_paths()]
     np.testing.assert_allclose(tops, np.quantile(errors["a"], 0.95, axis=0))
 
 
