@@ -10,7 +10,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import jax
 import numpy as np
@@ -73,11 +73,24 @@ def train(config: Config, world: World | None = None) -> list[Point]:
     with SummaryWriter(str(out / "tensorboard")) as writer, counter(config.ppo.num_timesteps, "training") as advance:
         watch = _Watch(config, world, out, writer, advance)
         with contextlib.suppress(_Solved):
-            _brax(config, world, watch)
+            learn(config, world, watch)
     return watch.points
 
 
-def _brax(config: Config, world: World, watch: "_Watch") -> None:
+class Listener(Protocol):
+    """What `learn` tells how it goes."""
+
+    def log(self, steps: int, metrics: Mapping[str, Any]) -> None:
+        """Training metrics, now and then and after each stretch between evaluations."""
+        ...
+
+    def evaluate(self, steps: int, make_policy: Any, parameters: Any) -> None:
+        """Called before the first step and every `checks.every` steps."""
+        ...
+
+
+def learn(config: Config, world: World, watch: Listener) -> None:
+    """Brax PPO on a world, with nothing written but what `watch` writes."""
     ppo = config.ppo
     update = ppo.num_envs * ppo.unroll_length
     evaluations = max(math.ceil(ppo.num_timesteps / max(config.checks.every, update)), 1)
