@@ -96,6 +96,21 @@ def base_rotation(demonstration: Demonstration) -> Float[np.ndarray, "3 3"]:
     return Rotation.from_quat(demonstration.motion.wrist_quaternion[first], scalar_first=True).as_matrix()
 
 
+def demonstration_model(
+    demonstration: Demonstration, hand: RigidHand, *, gains: Gains | None = None, visual: bool = False
+) -> mujoco.MjModel:
+    """The scene that a demonstration takes place in; arguments as of `scene_model`."""
+    return scene_model(
+        hand,
+        demonstration.object,
+        demonstration.support,
+        demonstration.support_position,
+        base_rotation(demonstration),
+        gains=gains,
+        visual=visual,
+    )
+
+
 def wrist_coordinates(
     position: Float[np.ndarray, "t 3"], quaternion: Float[np.ndarray, "t 4"], base: Float[np.ndarray, "3 3"]
 ) -> Float[np.ndarray, "t 6"]:

@@ -16,7 +16,7 @@ from envs.physics import make_engine
 from envs.physics.engine import PhysicsState
 from envs.reference import make_reference
 from envs.replay import assisted_replay
-from envs.scene import NUM_WRIST, base_rotation, scene_model
+from envs.scene import NUM_WRIST, demonstration_model
 from envs.task import Task
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
@@ -67,8 +67,8 @@ class TrackingEnv(Env):
         gains = Gains() if gains is None else gains
         self.reference = make_reference(demonstrations, hands, grip_force=self.task.grip_force, gains=gains)
         self.models = [
-            scene_model(hand, d.object, d.support, d.support_position, base_rotation(d), gains=gains)
-            for d, hand in zip(demonstrations, hands, strict=True)
+            demonstration_model(demonstration, hand, gains=gains)
+            for demonstration, hand in zip(demonstrations, hands, strict=True)
         ]
         self.engine = make_engine(engine, self.models, self.task.substeps)
         self.dt = float(self.models[0].opt.timestep * self.task.substeps)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from envs.rollout import Rollouts
-from envs.scene import base_rotation, scene_model
+from envs.scene import demonstration_model
 from mjx_hand.view.video import beside, render_frames, write_video
 from train.experiment import World
 
@@ -20,14 +20,7 @@ def side_by_side(world: World, rollouts: Rollouts, index: int, path: str | Path)
     """
     which = int(rollouts.demonstration[index])
     demonstration = world.demonstrations[which]
-    model = scene_model(
-        world.hands[which],
-        demonstration.object,
-        demonstration.support,
-        demonstration.support_position,
-        base_rotation(demonstration),
-        visual=True,
-    )
+    model = demonstration_model(demonstration, world.hands[which], visual=True)
     frames = np.flatnonzero(rollouts.counted[index])[:: max(round(rollouts.fps / _RATE), 1)]
     targets = np.asarray(world.env.reference.targets)[which]
     wanted = np.concatenate([targets[frames], rollouts.object_reference[index, frames]], axis=1)
