@@ -38,7 +38,6 @@ class Task:
     ahead: tuple[int, ...] = (1, 4, 12)
 
     def __post_init__(self):
-        object.__setattr__(self, "ahead", tuple(self.ahead))  # configuration files have lists
         positive = ("substeps", "wrist_move", "wrist_turn", "finger", "position_sharpness", "rotation_sharpness")
         for name in (*positive, "lost_at"):
             value = getattr(self, name)

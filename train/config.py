@@ -50,8 +50,7 @@ class Ppo:
     initial_std: float = 0.4
 
     def __post_init__(self):
-        for name in ("policy_layers", "value_layers"):  # configuration files have lists
-            object.__setattr__(self, name, tuple(getattr(self, name)))
+        for name in ("policy_layers", "value_layers"):
             if any(size < 1 for size in getattr(self, name)):
                 raise InputError(f"ppo.{name} is {list(getattr(self, name))}; every layer needs at least 1 unit")
         whole = ("num_timesteps", "num_envs", "unroll_length", "num_minibatches", "num_updates_per_batch")
@@ -141,9 +140,19 @@ def compose(overrides: Sequence[str] = ()) -> Config:
 
 def to_config(composed: DictConfig) -> Config:
     """The composed configuration as checked dataclasses."""
-    config = OmegaConf.to_object(composed)
-    assert isinstance(config, Config)
-    return config
+    return _made(Config, OmegaConf.to_container(composed, resolve=True, throw_on_missing=True))
+
+
+def _made(cls: Any, values: Any) -> Any:
+    """A dataclass from nested dictionaries. Configuration files have lists where frozen dataclasses have tuples."""
+    given = {}
+    for field in dataclasses.fields(cls):
+        if field.name in values:
+            value = values[field.name]
+            if isinstance(value, dict):
+                value = _made(field.type, value)
+            given[field.name] = tuple(value) if isinstance(value, list) else value
+    return cls(**given)
 
 
 def command(task: Callable[[Config], object]) -> None:

@@ -48,7 +48,7 @@ def _cannot_write(path: Path, error: OSError) -> InputError:
     return InputError(f"cannot write {path}: {error.strerror or error}; choose a place that you may write to")
 
 
-def save_arrays(path: str | Path, schema: str, arrays: Mapping[str, np.ndarray | float | str]) -> None:
+def save_arrays(path: str | Path, schema: str, arrays: Mapping[str, np.ndarray | int | float | str]) -> None:
     """Write named arrays as a compressed `.npz` with its schema."""
     with replacing(path) as temporary, temporary.open("wb") as file:
         stored = {name: np.asarray(value) for name, value in arrays.items()}
