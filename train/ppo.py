@@ -10,7 +10,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import jax
 import numpy as np
@@ -77,6 +77,7 @@ def train(config: Config, world: World | None = None) -> list[Point]:
     return watch.points
 
 
+@runtime_checkable
 class Listener(Protocol):
     """What `learn` tells how it goes."""
 
