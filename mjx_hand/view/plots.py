@@ -202,6 +202,37 @@ def retarget_errors(errors: Mapping[str, Float[Array, "_"]], *, label: str = "er
     return figure
 
 
+@mpl.rc_context(_STYLE)
+def throughput(rates: Mapping[str, Float[Array, "k 4"]], *, label: str) -> Figure:
+    """How fast each contestant is over its number of worlds, on logarithmic axes.
+
+    Args:
+        rates: name to rows of the number of worlds and the median, least and greatest rate.
+        label: of the vertical axis.
+
+    Raises:
+        InputError: nothing to draw, or a name without rows.
+    """
+    empty = [name for name, rows in rates.items() if len(rows) == 0]
+    if empty or not rates:
+        raise InputError(f"no rates to draw for {', '.join(empty) or 'any name'}; give at least one row each")
+    figure, axes = _figure(width=8.0, height=4.0)
+    looks = itertools.product(("solid", (0, (4, 2)), (0, (1, 1.5))), COLOURS)
+    for (name, rows), (line, colour) in zip(rates.items(), itertools.cycle(looks), strict=False):
+        worlds, median, least, greatest = rows[np.argsort(rows[:, 0])].T
+        axes.plot(worlds, median, color=colour, linestyle=line, marker="o", markersize=3.5, label=name)
+        axes.vlines(worlds, least, greatest, color=colour, linewidth=1.2, alpha=0.7)
+    axes.set_xscale("log", base=2)
+    axes.set_yscale("log")
+    axes.set_xticks(sorted({float(n) for rows in rates.values() for n in rows[:, 0]}), minor=False)
+    axes.xaxis.set_major_formatter(ticker.StrMethodFormatter("{x:,.0f}"))
+    axes.yaxis.set_major_formatter(ticker.EngFormatter(sep=""))
+    axes.set_xlabel("worlds")
+    axes.set_ylabel(label)
+    _legend_above(axes, columns=3)
+    return figure
+
+
 def save_figure(figure: Figure, path: str | Path) -> None:
     """Write as the suffix says (PNG on white at 150 dpi; SVG or PDF transparent); whole or not at all.
 
@@ -235,5 +266,5 @@ def _figure(width: float = 6.4, height: float = 3.2) -> tuple[Figure, Axes]:
     return figure, axes
 
 
-def _legend_above(axes: Axes) -> None:
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.2, handlelength=1.6)
+def _legend_above(axes: Axes, columns: int = 4) -> None:
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.2, handlelength=1.6)

@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
 
-from train.benchmark_retarget import SCIPY, main
+from train.benchmark.__main__ import main
+from train.benchmark.retarget import SCIPY
 
-SMALL = ["--poses", "60", "--runs", "1", "--scipy-poses", "1"]
+SMALL = ["retarget", "--poses", "60", "--runs", "1", "--scipy-poses", "1"]
 
 
 def rows(text, heading):

@@ -1,22 +1,17 @@
-"""`python -m train.benchmark_retarget`: accuracy and speed of the projection onto hinges, as Markdown tables.
+"""`python -m train.benchmark retarget`: accuracy and speed of the projection onto hinges, as Markdown tables.
 
 Errors are geodesic angles between each joint's rotation and what its hinges make of it. Times are medians of several
 runs, compilation apart. SciPy solves joint by joint from the naive angles, as one would without this library.
 """
 
-import os
-import platform
-import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-import tyro
 from jaxtyping import Float
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
@@ -30,6 +25,7 @@ from mjx_hand.retarget.sequence import rigid_hand_of
 from mjx_hand.rigid.build import build_rigid_hand
 from mjx_hand.rigid.rigid_hand import RigidHand, joint_rotations
 from mjx_hand.rotations import geodesic_angle
+from train.benchmark.machine import machine
 
 # Mean and largest error (degrees) and ms a pose in the paper's Table 1. Its third column, RMSE 24.31, is
 # larger than its own largest error, so it is not the RMSE of these errors, and is left out.
@@ -56,17 +52,6 @@ class Options:
     recording: Path | None = None
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Print the tables; returns the exit status: 0, or 2 for input that cannot be used."""
-    options = tyro.cli(Options, args=argv)
-    try:
-        print("\n".join(report(options)))
-    except InputError as error:
-        print(f"benchmark_retarget: {error}", file=sys.stderr)
-        return 2
-    return 0
-
-
 def report(options: Options) -> list[str]:
     """The lines of the report.
 
@@ -79,7 +64,7 @@ def report(options: Options) -> list[str]:
     hand = load_hand()
     rigid = build_rigid_hand(hand)
     lines = [
-        hardware(),
+        *machine("jax", "jaxlib", "numpy", "scipy"),
         "",
         f"## {ACCURACY_POSES} random anatomical poses, off axis by {np.degrees(OFF_AXIS):.0f}°",
         "",
@@ -93,20 +78,6 @@ def report(options: Options) -> list[str]:
         lines += ["", f"## {options.recording.parent.name}/{options.recording.name}, {len(recorded)} frames", ""]
         lines += accuracy_table(recorded, rigid_hand_of(motion, load_hand(side=motion.side)), options.runs)
     return [*lines, "", f"## One call over {options.poses:,} poses", "", *speed_table(rigid, options)]
-
-
-def hardware() -> str:
-    """What it ran on, in one line."""
-    names = [line.split(":")[1].strip() for line in _lines("/proc/cpuinfo") if line.startswith("model name")]
-    cpu = names[0] if names else platform.processor() or platform.machine()
-    packages = ", ".join(f"{p} {version(p)}" for p in ("jax", "jaxlib", "numpy", "scipy"))
-    device = jax.devices()[0].device_kind
-    return f"{cpu}, {os.cpu_count()} cores; JAX on {device}; Python {platform.python_version()}, {packages}"
-
-
-def _lines(path: str) -> list[str]:
-    file = Path(path)
-    return file.read_text().splitlines() if file.exists() else []
 
 
 def random_poses(rigid: RigidHand, count: int, seed: int) -> Float[jax.Array, "n 15 3 3"]:
@@ -198,7 +169,3 @@ def median_seconds(call: Callable[[], jax.Array], runs: int) -> float:
         call().block_until_ready()
         times.append(time.perf_counter() - started)
     return float(np.median(times))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,0 +1,39 @@
+"""`python -m train.benchmark [engines|retarget]`: what this machine does; both where none is named."""
+
+import sys
+from collections.abc import Sequence
+
+import tyro
+
+from mjx_hand.compile_cache import enable_compile_cache
+from mjx_hand.errors import InputError
+from train.benchmark import engines, retarget
+
+MODULES = {"engines": engines, "retarget": retarget}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Print the reports as Markdown; returns the exit status: 0, or 2 for input that cannot be used.
+
+    Args:
+        argv: the arguments; the process's own if None.
+    """
+    argv = sys.argv[1:] if argv is None else argv
+    options = {name: module.Options for name, module in MODULES.items()}
+    try:
+        enable_compile_cache()
+        if argv:
+            chosen = [tyro.extras.subcommand_cli_from_dict(options, prog="python -m train.benchmark", args=argv)]
+        else:
+            chosen = [make() for make in options.values()]
+        for choice in chosen:
+            (module,) = (m for m in MODULES.values() if type(choice) is m.Options)
+            print("\n".join(module.report(choice)) + "\n", flush=True)
+    except InputError as error:
+        print(f"benchmark: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
