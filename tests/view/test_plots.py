@@ -68,6 +68,15 @@ def test_retarget_errors_name_their_medians():
     assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["index tip  2.00", "thumb tip  3.00"]
 
 
+def test_throughput_shows_medians_in_order_with_the_spread_of_runs():
+    rows = np.array([[64, 9e3, 8e3, 1e4], [1, 2e3, 1e3, 3e3]])
+    figure = plots.throughput({"native": rows, "mjx": rows[:1] / 10}, label="steps/s")
+    np.testing.assert_allclose(line(figure, "native"), [[1, 2e3], [64, 9e3]])
+    spread = [path.vertices for path in figure.axes[0].collections[0].get_paths()]
+    np.testing.assert_allclose(spread, [[[1, 1e3], [1, 3e3]], [[64, 8e3], [64, 1e4]]])
+    assert figure.axes[0].get_xscale() == figure.axes[0].get_yscale() == "log"
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
@@ -77,6 +86,7 @@ def test_retarget_errors_name_their_medians():
         (lambda: plots.joint_errors(["a"], {}), "at least one method"),
         (lambda: plots.joint_errors(["a"], {"m": np.ones((4, 2))}), "2 columns for 1 joints"),
         (lambda: plots.retarget_errors({"tip": np.zeros(0)}), "no errors to draw for tip"),
+        (lambda: plots.throughput({"native": np.zeros((0, 4))}, label="steps/s"), "no rates to draw for native"),
     ],
 )
 def test_bad_input_is_refused(make, message):
