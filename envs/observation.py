@@ -45,8 +45,9 @@ def observe(
 ) -> Float[Array, "o"]:
     """The observation at `frame` of a demonstration.
 
-    Own pose against the reference, speeds, the residual so far and the grip; the object against its reference, in the wrist's base frame;
-    finger tips around the object, in its own frame; targets and object some frames ahead; phase, and what the object is.
+    Own pose against the reference, speeds, the residual so far and the grip; the object against its reference, in the
+    wrist's base frame; finger tips around the object, in its own frame; targets and object some frames ahead; phase,
+    and what the object is.
     """
     base = reference.base[demonstration]
     targets, poses = reference.targets[demonstration], reference.object_pose[demonstration]

@@ -1,7 +1,8 @@
 """Demonstration sets on disk: made once by simulated capture, then read back.
 
-A set is a folder of `train/NNN.npz` and `heldout/NNN.npz` (schema mjx-hand/demonstration/1). Beside each stand the motion
-that was fitted to its markers, `NNN.motion.npz` (which `mjx-hand retarget` reads), and its truth, `NNN.truth.npz`. Training and held-out demonstrations come from different people, object sizes and seeds.
+A set is a folder of `train/NNN.npz` and `heldout/NNN.npz` (schema mjx-hand/demonstration/1). Beside each stand the
+motion that was fitted to its markers, `NNN.motion.npz` (which `mjx-hand retarget` reads), and its truth,
+`NNN.truth.npz`. Training and held-out demonstrations come from different people, object sizes and seeds.
 """
 
 import dataclasses

@@ -42,7 +42,8 @@ class CaptureSettings:
         marker_noise: standard deviation of each marker coordinate, m.
         gap_fraction: share of frames in which a marker is hidden.
         off_axis: rotations that hinges cannot follow, as a share of what real recordings show.
-        object_noise: standard deviation of the object's measured position, m; of its orientation, ten times as many rad.
+        object_noise: standard deviation of the object's measured position, m; of its orientation, ten times as many
+            rad.
         rate: of the demonstrations made from the recordings, 1/s.
         cutoff: of the low-pass filter on their angles and poses, Hz.
     """

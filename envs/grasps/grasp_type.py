@@ -1,8 +1,8 @@
 """`GraspType`: everything that makes one kind of grasp, as data.
 
 A grasp type is one file in this folder that assigns a `GraspType` to `GRASP`; nothing else needs an edit.
-Lengths metres, angles radians, forces newtons. Hand directions are those of MANO's right hand: fingers along -x, back of
-the hand +y, thumb side +z. World: z up, the object's frame parallel to the world at first.
+Lengths metres, angles radians, forces newtons. Hand directions are those of MANO's right hand: fingers along -x, back
+of the hand +y, thumb side +z. World: z up, the object's frame parallel to the world at first.
 """
 
 import dataclasses

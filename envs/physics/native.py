@@ -1,7 +1,8 @@
 """The `native` engine: MuJoCo's C engine on all cores, through `mujoco.batch.Batch`.
 
 The simulation state crosses into JAX bit-cast from float64 to pairs of uint32, so that stepping is a pure and exact
-function of what JAX holds: it survives scans, `where` and checkpoints without rounding. Only NumPy runs in the callback.
+function of what JAX holds: it survives scans, `where` and checkpoints without rounding. Only NumPy runs in the
+callback.
 """
 
 import copy
@@ -41,8 +42,8 @@ def make(models: Sequence[mujoco.MjModel], substeps: int) -> "NativeEngine":
 def tuned(models: Sequence[mujoco.MjModel]) -> list[mujoco.MjModel]:
     """Copies with this engine's settings.
 
-    Newton stops early, so its caps are cheap; impratio 10 because at 1 no pinch holds. Elliptic cones: pyramidal ones step
-    half as fast again, and lose half of all pinches (19 of 40 held against 38 of 40, same scripts).
+    Newton stops early, so its caps are cheap; impratio 10 because at 1 no pinch holds. Elliptic cones: pyramidal ones
+    step half as fast again, and lose half of all pinches (19 of 40 held against 38 of 40, same scripts).
     """
     copies = [copy.copy(model) for model in models]
     for model in copies:
