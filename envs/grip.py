@@ -1,8 +1,8 @@
 """Grip offsets: what the fingers must add to a demonstration's angles so that they press on the object.
 
-A recording shows where fingers are, not how hard they press: replayed alone it drops the object. The offsets follow from
-the demonstration and the object's shape alone, without simulation. Added to the reference they hold some objects for some
-time; the policy's residual does the rest.
+A recording shows where fingers are, not how hard they press: replayed alone it drops the object. The offsets follow
+from the demonstration and the object's shape alone, without simulation. Added to the reference they hold some objects
+for some time; the policy's residual does the rest.
 """
 
 import jax
@@ -30,11 +30,11 @@ def grip_offsets(
 ) -> Float[Array, "t 20"]:
     """Hinge offsets (rad) that put each touching finger's last link on the object's surface and press it there.
 
-    Two parts: a damped least-squares step that closes the gap (or opens it, where capture error left the finger inside),
-    and dq = J^T f / kp for the force.
+    Two parts: a damped least-squares step that closes the gap (or opens it, where capture error left the finger
+    inside), and dq = J^T f / kp for the force.
 
-    The thumb presses with `force` newtons, the fingers that touch share as much between them; a hand whose thumb does not
-    touch presses with its fingers only, against the palm.
+    The thumb presses with `force` newtons, the fingers that touch share as much between them; a hand whose thumb does
+    not touch presses with its fingers only, against the palm.
 
     Args:
         angles: demonstrated hinge angles.
@@ -76,4 +76,3 @@ def grip_offsets(
         return closing + jnp.clip(torque, -limit, limit) / stiffness
 
     return jax.lax.map(lambda row: one(*row), (angles, *object_in_hand), batch_size=64)
-

@@ -45,7 +45,7 @@ class ParallelEnv(Env):
             **state.info,
             "rng": later,
             "episode_done": zero,
-            "episode_metrics": {name: zero for name in ("sum_reward", "length", *state.metrics)},
+            "episode_metrics": dict.fromkeys(("sum_reward", "length", *state.metrics), zero),
         }
         return state.replace(info=info)  # type: ignore[attr-defined]
 

@@ -1,7 +1,7 @@
 """Assisted replay: each demonstration rolled out once while the object is carried along its reference.
 
-Its states are where training episodes may start (reference-state initialisation): consistent in the physics, because the
-hand really moved there under its controller and really presses on the object.
+Its states are where training episodes may start (reference-state initialisation): consistent in the physics, because
+the hand really moved there under its controller and really presses on the object.
 """
 
 import copy
@@ -62,7 +62,7 @@ def _with_heavy_object(model: mujoco.MjModel) -> mujoco.MjModel:
 
 
 def _object_speed(pose: Float[np.ndarray, "d t 7"], dt: float) -> Float[np.ndarray, "d t 6"]:
-    """Free-joint velocities by central differences: linear in the world (m/s), angular in the object's frame (rad/s)."""
+    """Free-joint velocities by central differences: linear (m/s) in the world, angular (rad/s) in the object's frame."""
     count, frames = pose.shape[:2]
     before, after = np.maximum(np.arange(frames) - 1, 0), np.minimum(np.arange(frames) + 1, frames - 1)
     seconds = ((after - before) * dt)[:, None]

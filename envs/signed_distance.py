@@ -1,12 +1,13 @@
 """Signed distances from points to objects of simple shape, differentiable, for grasp postures and grip offsets."""
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from mjx_hand.errors import InputError
 
 
-def signed_distance(kind: str, size: Float[Array, "*b 3"], point: Float[Array, "*b 3"]) -> Float[Array, "*b"]:
+def signed_distance(kind: str, size: Float[Array, "*#b 3"], point: Float[Array, "*#b 3"]) -> Float[Array, "*#b"]:
     """Distance (m) from a point in the object's frame to its surface, negative inside.
 
     Args:
@@ -25,7 +26,7 @@ def signed_distance(kind: str, size: Float[Array, "*b 3"], point: Float[Array, "
     raise InputError(f"object kind {kind!r} is not known; valid: box, sphere, cylinder")
 
 
-def half_extents(kind: str, size: Float[Array, "*b 3"]) -> Float[Array, "*b 3"]:
+def half_extents(kind: str, size: Float[Array | np.ndarray, "*b 3"]) -> Float[Array, "*b 3"]:
     """Half extents (m) of the object's bounding box in its own frame."""
     if kind == "sphere":
         return jnp.stack([size[..., 0]] * 3, axis=-1)

@@ -20,7 +20,8 @@ class Task:
         lost_at: a rollout ends when the object is this far from its reference.
         mid_start: share of training episodes that start in the middle of a demonstration, at a state from its own
             assisted replay (reference-state initialisation); the rest start at frame 0.
-        grip_force: force (N) with which the reference presses finger tips that touch; 0 replays demonstrations as they are.
+        grip_force: force (N) with which the reference presses finger tips that touch; 0 leaves demonstrations as they
+            are.
         ahead: how many frames ahead the policy sees the reference.
     """
 

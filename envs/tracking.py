@@ -1,6 +1,7 @@
 """`TrackingEnv`: a twin of the hand replays demonstrations, with a residual that mends what replaying alone loses.
 
-target(t) = demonstration(t) + grip(t) + residual(t), led by the controllers' own lag; residual <- tau residual + (1 - tau) scale action (arXiv 2512.07359, section IV).
+target(t) = demonstration(t) + grip(t) + residual(t), the first led by the controllers' own lag;
+residual <- tau residual + (1 - tau) scale action (arXiv 2512.07359, section IV).
 """
 
 from collections.abc import Sequence
@@ -116,7 +117,7 @@ class TrackingEnv(Env):
             residual=jnp.zeros(self.action_size),
         )
         zero = jnp.zeros(())
-        metrics = {name: zero for name in (*_TERMS, "error/position", "error/rotation", "unstable")}
+        metrics = dict.fromkeys((*_TERMS, "error/position", "error/rotation", "unstable"), zero)
         return State(twin, self._observe(twin), zero, zero, metrics, {"truncation": zero})  # type: ignore[call-arg]
 
     def step(self, state: State, action: Float[Array, "26"]) -> State:
