@@ -72,6 +72,6 @@ class ParallelEnv(Env):
 
         return stepped.replace(  # type: ignore[attr-defined]
             pipeline_state=jax.tree.map(choose, fresh.pipeline_state, stepped.pipeline_state),
-            obs=choose(fresh.obs, stepped.obs),
+            obs=jax.tree.map(choose, fresh.obs, stepped.obs),
             info=info,
         )

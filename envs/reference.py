@@ -103,7 +103,7 @@ def _anticipated(targets: Float[Array, "d t 26"], gains: Gains, fps: float) -> F
     """
     kp = np.concatenate([[gains.wrist_slide[0]] * 3, [gains.wrist_turn[0]] * 3, gains.stiffness])
     kv = np.concatenate([[gains.wrist_slide[1]] * 3, [gains.wrist_turn[1]] * 3, gains.damping])
-    speed = jnp.gradient(targets, 1 / fps, axis=1)
+    speed = jnp.asarray(jnp.gradient(targets, 1 / fps, axis=1))
     return targets + jnp.asarray(kv / kp - 0.5 / fps, jnp.float32) * speed
 
 

@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 from envs.observation import wrist_rotation
 from envs.rollout import Rollouts
 from envs.scene import NUM_WRIST
-from envs.tracking import TrackingEnv
+from envs.tracking import TrackingEnv, twin_of
 from mjx_hand.hand.joints import NUM_HINGES, TIP_LINKS
 from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics, stack_hands
 
@@ -43,12 +43,13 @@ def make_roll_out(
     def run(parameters: object) -> tuple[Array, Array, Array]:
         def step(state, _):  # type: ignore[no-untyped-def]
             state = jax.vmap(env.step)(state, policy(parameters, state.obs))
-            physics = state.pipeline_state.physics
+            physics = twin_of(state).physics
             return state, (physics.qpos, physics.sensordata, state.reward)
 
         count = env.num_demonstrations
-        first = jax.vmap(lambda d: env.start(d, 0))(jnp.arange(count))
-        start = (first.pipeline_state.physics.qpos, first.pipeline_state.physics.sensordata, first.reward)
+        first = jax.vmap(env.start)(jnp.arange(count), jnp.zeros(count, int))
+        physics = twin_of(first).physics
+        start = (physics.qpos, physics.sensordata, first.reward)
         _, rest = jax.lax.scan(step, first, length=steps)
         return jax.tree.map(lambda a, b: jnp.moveaxis(jnp.concatenate([a[None], b]), 0, 1), start, rest)
 

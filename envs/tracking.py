@@ -5,6 +5,7 @@ residual <- tau residual + (1 - tau) scale action (arXiv 2512.07359, section IV)
 """
 
 from collections.abc import Sequence
+from typing import cast
 
 import jax
 import jax.numpy as jnp
@@ -38,6 +39,11 @@ class Twin:
     demonstration: Int[Array, ""]
     frame: Int[Array, ""]
     residual: Float[Array, "26"]
+
+
+def twin_of(state: State) -> Twin:
+    """What a state of `TrackingEnv` carries; Brax's own type for it is that of its physics."""
+    return cast(Twin, state.pipeline_state)
 
 
 class TrackingEnv(Env):
@@ -122,7 +128,7 @@ class TrackingEnv(Env):
 
     def step(self, state: State, action: Float[Array, "26"]) -> State:
         """One control step towards the next frame of the demonstration; past its end the last frame is held."""
-        twin: Twin = state.pipeline_state  # type: ignore[assignment]
+        twin = twin_of(state)
         task = self.task
         action = jnp.clip(action, -1.0, 1.0)
         residual = task.smoothing * twin.residual + (1 - task.smoothing) * residual_scale(task) * action

@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Callable, Sequence
 
 import jax
+import jax.numpy as jnp
 import mujoco
 import numpy as np
 from jaxtyping import Float
@@ -100,7 +101,9 @@ def _attempt(
     gains = Gains()
     motions, models, starts, supports = [], [], [], []
     for k in good:
-        centre = np.array([0.0, 0.0, 2 * grasp.support[2] + half_extents(things[k].kind, things[k].size)[2]])
+        centre = np.array(
+            [0.0, 0.0, 2 * grasp.support[2] + half_extents(things[k].kind, jnp.asarray(things[k].size))[2]]
+        )
         supports.append(np.array([0.0, 0.0, grasp.support[2]]))
         starts.append(np.concatenate([centre, [1.0, 0.0, 0.0, 0.0]]))
         motions.append(_draw_motion(grasp, postures[k], centre, hands[k], gains, rng))
