@@ -62,7 +62,7 @@ def _with_heavy_object(model: mujoco.MjModel) -> mujoco.MjModel:
 
 
 def _object_speed(pose: Float[np.ndarray, "d t 7"], dt: float) -> Float[np.ndarray, "d t 6"]:
-    """Free-joint velocities by central differences: linear (m/s) in the world, angular (rad/s) in the object's frame."""
+    """Free-joint velocities by central differences: linear m/s in the world, angular rad/s in the object's axes."""
     count, frames = pose.shape[:2]
     before, after = np.maximum(np.arange(frames) - 1, 0), np.minimum(np.arange(frames) + 1, frames - 1)
     seconds = ((after - before) * dt)[:, None]
