@@ -1,0 +1,51 @@
+"""One tiny set of real demonstrations and one tiny training, made once a session: compiling them is what costs."""
+
+from pathlib import Path
+
+import pytest
+from filelock import FileLock
+
+from envs.demonstrations.dataset import SetSettings, make_set
+from train.config import Checks, Config, Ppo
+from train.experiment import World, make_world
+from train.ppo import Point, train
+
+TINY = Ppo(
+    num_timesteps=64,
+    num_envs=4,
+    unroll_length=8,
+    num_minibatches=2,
+    num_updates_per_batch=2,
+    policy_layers=(16,),
+    value_layers=(16,),
+)
+
+
+@pytest.fixture(scope="session")
+def tiny(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Config:
+    """An experiment on one demonstration of each part. Several workers share one set."""
+    base = tmp_path_factory.getbasetemp()
+    shared = base.parent if hasattr(request.config, "workerinput") else base
+    config = Config(
+        name="tiny",
+        engine="native",
+        out=str(tmp_path_factory.mktemp("tiny") / "out"),
+        demonstrations=str(shared / "demonstrations"),
+        data=SetSettings(grasp="pinch", people=1, heldout_people=1, trials=1),
+        ppo=TINY,
+        checks=Checks(every=32),
+    )
+    with FileLock(shared / "demonstrations.lock"):
+        make_set(config.data, config.demonstrations)
+    return config
+
+
+@pytest.fixture(scope="session")
+def world(tiny: Config) -> World:
+    return make_world(tiny, "train")
+
+
+@pytest.fixture(scope="session")
+def trained(tiny: Config, world: World) -> tuple[Path, list[Point]]:
+    """The folder of a finished training, and what it returned."""
+    return Path(tiny.out), train(tiny, world)

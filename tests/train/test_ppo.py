@@ -1,0 +1,172 @@
+import csv
+import dataclasses
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from omegaconf import OmegaConf
+
+from envs.failure import FAILURES
+from mjx_hand.errors import InputError
+from train.checkpoint import load_checkpoint, save_checkpoint
+from train.config import Checks, Config, compose
+from train.evaluate import POLICY, REPLAY, ZERO, Results, evaluate_checkpoint, tables, write_results
+from train.experiment import World, chosen_checkpoint
+from train.ppo import Point, train
+
+Trained = tuple[Path, list[Point]]
+
+
+def arrays(path: Path) -> dict[str, np.ndarray]:
+    with np.load(path, allow_pickle=False) as file:
+        return dict(file)
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def in_folder(config: Config, out: Path, **change: Any) -> Config:
+    return dataclasses.replace(config, out=str(out), **change)
+
+
+def test_evaluations_come_before_learning_and_every_so_many_steps(trained: Trained):
+    _, points = trained
+    assert [point.steps for point in points] == [0, 32, 64]
+    assert np.all(np.diff([point.seconds for point in points]) > 0)
+    assert all(np.isfinite(dataclasses.astuple(point)).all() for point in points)
+
+
+def test_the_curve_is_what_was_returned(trained: Trained):
+    out, points = trained
+    written = rows(out / "curve.csv")
+    assert list(written[0]) == [field.name for field in dataclasses.fields(Point)]
+    np.testing.assert_allclose(
+        [[float(value) for value in row.values()] for row in written], [dataclasses.astuple(p) for p in points], 1e-4
+    )
+
+
+def test_the_folder_holds_what_it_takes_to_go_on(trained: Trained, tiny: Config):
+    out, _ = trained
+    assert {path.name for path in out.iterdir()} >= {"best.npz", "config.yaml", "curve.csv", "last.npz", "tensorboard"}
+    assert not list(out.rglob(".*")), "a temporary file was left behind"
+    (events,) = (out / "tensorboard").iterdir()
+    assert b"evaluation/tracking_error_cm" in events.read_bytes()
+    written = OmegaConf.load(out / "config.yaml")
+    assert written == OmegaConf.create(json.loads(json.dumps(dataclasses.asdict(tiny))))
+
+
+def test_checkpoints_say_where_they_come_from(trained: Trained, world: World):
+    out, points = trained
+    last, best = load_checkpoint(out / "last.npz"), load_checkpoint(out / "best.npz")
+    assert (last.steps, last.experiment, last.observation_size) == (64, "tiny", world.env.observation_size)
+    chosen = min(points, key=lambda point: (-point.success, point.tracking_error_cm))
+    assert (best.steps, best.success) == (chosen.steps, chosen.success)
+
+
+def test_learning_changes_every_layer(trained: Trained, tiny: Config, world: World, tmp_path):
+    out, _ = trained
+    stopped = train(in_folder(tiny, tmp_path, checks=Checks(every=32, stop_at=0.0)), world)
+    assert [point.steps for point in stopped] == [0], "stop_at was reached before any learning"
+    before, after = arrays(tmp_path / "last.npz"), arrays(out / "last.npz")
+    layers = [name for name in after if name.startswith(("policy/", "value/"))]
+    assert len(layers) >= 9
+    for name in layers:
+        assert before[name].shape == after[name].shape
+        assert np.isfinite(after[name]).all()
+        assert not np.array_equal(before[name], after[name]), f"{name} did not change"
+    assert len(rows(tmp_path / "curve.csv")) == 1
+
+
+def test_the_same_seed_gives_the_same_policy_bit_for_bit(trained: Trained, tiny: Config, world: World, tmp_path):
+    out, points = trained
+    again = train(in_folder(tiny, tmp_path), world)
+    assert [(p.steps, p.success, p.tracking_error_cm, p.rotation_error_deg) for p in again] == [
+        (p.steps, p.success, p.tracking_error_cm, p.rotation_error_deg) for p in points
+    ]
+    for name in ("best.npz", "last.npz"):
+        first, second = arrays(out / name), arrays(tmp_path / name)
+        assert first.keys() == second.keys()
+        for key in first:
+            np.testing.assert_array_equal(second[key], first[key])
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_any_work(tiny: Config, tmp_path):
+    (tmp_path / "file").touch()
+    nowhere = in_folder(tiny, tmp_path / "file" / "out", demonstrations=str(tmp_path / "none"))
+    with pytest.raises(InputError, match=r"cannot write .*file/out: .*; choose another folder with out=FOLDER"):
+        train(nowhere)
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.fixture(scope="module")
+def results(trained: Trained, tiny: Config) -> Results:
+    made = evaluate_checkpoint(tiny)
+    write_results(made, tiny)
+    return made
+
+
+def test_the_tables_have_the_policy_and_both_baselines(results: Results, tiny: Config):
+    scores, failures = tables(results, tiny)
+    assert list(scores.columns) == ["", POLICY, ZERO, REPLAY, "paper"]
+    assert list(failures.columns) == ["", POLICY, ZERO, REPLAY]
+    assert [row[0] for row in failures.rows] == list(FAILURES)
+    assert "1 held-out demonstrations" in scores.note
+    shown = {row[0]: row[1:4] for row in scores.rows}
+    means = [f"{results.evaluations[title].rows()['tracking_error_cm']:.2f} cm" for title in (POLICY, ZERO, REPLAY)]
+    assert list(shown["tracking error, mean over all rollouts"]) == means
+    assert any(title.startswith("still held") for title in shown), "rollouts go on after the demonstration"
+
+
+def test_the_two_files_agree_with_each_other_and_with_the_rollouts(results: Results, trained: Trained):
+    out, _ = trained
+    summary = json.loads((out / "evaluation.json").read_text())
+    assert (summary["experiment"], summary["engine"], summary["demonstrations"]) == ("tiny", "native", 1)
+    assert summary["checkpoint_steps"] == load_checkpoint(out / "best.npz").steps
+    written = rows(out / "evaluation.csv")
+    titles = (POLICY, ZERO, REPLAY)
+    assert [(row["column"], row["demonstration"]) for row in written] == [(title, "0") for title in titles]
+    for title, row in zip(titles, written, strict=True):
+        scores: Mapping[str, float] = summary["scores"][title]
+        assert list(row) == ["column", "demonstration", *scores, "failure"]
+        np.testing.assert_allclose([float(row[name]) for name in scores], list(scores.values()), rtol=1e-5)
+        assert (row["failure"] == "") == (float(row["manip_trans_object"]) == 1)
+        shares = summary["failures"][title]
+        assert {reason for reason, share in shares.items() if share} == ({row["failure"]} - {""})
+
+
+def test_baselines_do_not_depend_on_the_checkpoint_but_the_policy_does(results: Results):
+    errors = {title: e.scores["tracking_error_cm"][0] for title, e in results.evaluations.items()}
+    assert len(set(errors.values())) == 3
+    pressed, alone = (np.asarray(results.rollouts[title].qpos) for title in (ZERO, REPLAY))
+    np.testing.assert_array_equal(pressed[:, 0], alone[:, 0])
+    assert not np.array_equal(pressed, alone)
+
+
+def test_a_checkpoint_of_another_task_is_refused(trained: Trained, tiny: Config, world: World, tmp_path):
+    out, _ = trained
+    size = world.env.observation_size
+    other = dataclasses.replace(load_checkpoint(out / "best.npz"), observation_size=size + 1)
+    save_checkpoint(other, tmp_path / "other.npz")
+    with pytest.raises(InputError, match=f"reads {size + 1} observations, this task gives {size}; use the task"):
+        chosen_checkpoint(dataclasses.replace(tiny, checkpoint=str(tmp_path / "other.npz")), size)
+    with pytest.raises(InputError, match="no such checkpoint; train one first"):
+        chosen_checkpoint(in_folder(tiny, tmp_path), size)
+    assert chosen_checkpoint(tiny, size).steps == load_checkpoint(out / "best.npz").steps
+
+
+@pytest.mark.slow
+def test_a_short_training_beats_the_zero_residual(tmp_path):
+    """Held-out people and objects, which training has not seen."""
+    folders = [f"out={tmp_path / 'out'}", f"demonstrations={tmp_path / 'demonstrations'}"]
+    few = ["data.people=4", "data.heldout_people=4", "ppo.num_timesteps=300000", "checks.stop_at=0.95"]
+    config = compose(["config=pinch_demo", "engine=native", *folders, *few])
+    train(config)
+    evaluations = evaluate_checkpoint(config).evaluations
+    policy, zero = evaluations[POLICY].rows(), evaluations[ZERO].rows()
+    assert policy["manip_trans_object"] >= zero["manip_trans_object"] + 0.25
+    assert policy["tracking_error_cm"] < 0.7 * zero["tracking_error_cm"]
