@@ -82,8 +82,8 @@ def environment(env: TrackingEnv, worlds: int) -> Contestant:
     parallel = ParallelEnv(env)
     state = jax.jit(parallel.reset)(jax.random.split(jax.random.key(0), worlds))
 
-    def advance(state: Any, key: jax.Array, steps: int) -> Any:
-        def step(k: jax.Array, state: Any) -> Any:
+    def advance(state: Any, key: jax.Array, steps: jax.Array) -> Any:
+        def step(k: Any, state: Any) -> Any:
             shape = (worlds, env.action_size)
             return parallel.step(state, jax.random.uniform(jax.random.fold_in(key, k), shape, minval=-1, maxval=1))
 
@@ -106,8 +106,8 @@ def physics(env: TrackingEnv, worlds: int) -> Contestant:
     script = make_script(env, worlds)
     start = jax.jit(jax.vmap(env.start))(script.variant, script.frame).pipeline_state.physics
 
-    def advance(start: Any, controls: jax.Array, steps: int) -> Any:
-        def step(k: jax.Array, state: Any) -> Any:
+    def advance(start: Any, controls: jax.Array, steps: jax.Array) -> Any:
+        def step(k: Any, state: Any) -> Any:
             state = jax.tree.map(lambda a, b: jnp.where(k % PASS == 0, a, b), start, state)
             return jax.vmap(env.engine.step)(state, controls[k % PASS])
 

@@ -10,8 +10,6 @@ from train.config import Checks, Config, Ppo
 from train.experiment import World
 from train.ppo import learn
 
-_UPDATES = 4  # PPO updates a run
-
 
 @dataclass(frozen=True)
 class Learning:
@@ -33,7 +31,7 @@ class Learning:
 
 
 def measure_learning(config: Config, world: World, alone: Contestant, runs: int, seconds: float) -> Learning:
-    """Train for `runs` runs of a few updates; between them the engine runs alone, to compare at the same moment.
+    """Train for `runs` runs of one update; between them the engine runs alone, to compare at the same moment.
 
     Args:
         config: the experiment, for its engine and demonstrations.
@@ -45,8 +43,7 @@ def measure_learning(config: Config, world: World, alone: Contestant, runs: int,
     Raises:
         InputError: a number of worlds that PPO cannot split into its minibatches.
     """
-    unroll = Ppo().unroll_length
-    each = alone.worlds * unroll * _UPDATES
+    each = alone.worlds * Ppo().unroll_length
     ppo = Ppo(num_envs=alone.worlds, num_timesteps=(runs + 1) * each)
     experiment = Config(name=config.name, engine=config.engine, data=config.data, ppo=ppo, checks=Checks(every=each))
     watch = _Watch(alone, seconds)

@@ -55,7 +55,8 @@ def test_report_is_a_table_with_the_same_figures_in_a_file_and_a_plot(demonstrat
         assert (row[6] == "") == (kept["compile_seconds"] is None) == row[0].startswith("mujoco.")
     assert content["machine"]["cores"] >= 1
     assert content["versions"]["mujoco"]
-    assert Image.open(tmp_path / "engines.png").format == "PNG"
+    with Image.open(tmp_path / "engines.png") as image:
+        assert image.format == "PNG"
 
 
 def test_an_engine_that_is_not_installed_has_a_row_that_says_how(monkeypatch):
