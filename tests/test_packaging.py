@@ -78,4 +78,6 @@ def test_command_builds_a_hand_from_another_folder(installed, tmp_path):
 
 
 def test_training_entry_point_finds_its_configurations(installed, tmp_path):
-    assert "config" in run([installed / "python", "-m", "train.ppo", "--cfg", "job"], tmp_path)
+    shown = run([installed / "python", "-m", "train.ppo", "--cfg", "job", "config=pinch_demo"], tmp_path)
+    assert "name: pinch_demo\n" in shown
+    assert list(tmp_path.iterdir()) == []

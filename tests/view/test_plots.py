@@ -72,7 +72,7 @@ def test_throughput_shows_medians_in_order_with_the_spread_of_runs():
     rows = np.array([[64, 9e3, 8e3, 1e4], [1, 2e3, 1e3, 3e3]])
     figure = plots.throughput({"native": rows, "mjx": rows[:1] / 10}, label="steps/s")
     np.testing.assert_allclose(line(figure, "native"), [[1, 2e3], [64, 9e3]])
-    spread = [path.vertices for path in figure.axes[0].collections[0].get_paths()]
+    spread = [corners(path) for path in figure.axes[0].collections[0].get_paths()]
     np.testing.assert_allclose(spread, [[[1, 1e3], [1, 3e3]], [[64, 8e3], [64, 1e4]]])
     assert figure.axes[0].get_xscale() == figure.axes[0].get_yscale() == "log"
 
