@@ -76,7 +76,9 @@ def text(results: Results) -> list[str]:
         "## Physics engines on the pinch scene",
         "",
         *machine(*_PACKAGES),
-        f"A control step is {results.substeps} physics steps, {1e3 * results.dt:g} ms.",
+        f"A control step is {results.substeps} physics steps, {1e3 * results.dt:g} ms. Compare rows of one kind:",
+        "*physics* starts anew all over the demonstrations, *environment* goes where random actions lead, so that",
+        "a step of one is not the same work as a step of the other.",
         "",
         "| | what | worlds | control steps/s: median (least to greatest) | physics steps/s | × real time, a world "
         "| compiling, s |",
@@ -96,7 +98,7 @@ def text(results: Results) -> list[str]:
 
 
 def _learning_table(learning: Learning) -> list[str]:
-    share = f"{100 * learning.physics_share:.0f} % of the time"
+    share = f"{100 * learning.physics_share:.0f} % (estimate)"
     return [
         "| training with PPO on | worlds | control steps/s: median (least to greatest) | physics | compiling, s |",
         "|---|---:|---:|---:|---:|",

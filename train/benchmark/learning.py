@@ -10,6 +10,8 @@ from train.config import Checks, Config, Ppo
 from train.experiment import World
 from train.ppo import learn
 
+_COMPILING = 2  # Brax compiles its first run, and again for the second, whose inputs are laid out otherwise
+
 
 @dataclass(frozen=True)
 class Learning:
@@ -18,9 +20,10 @@ class Learning:
     Attributes:
         engine: on which.
         worlds: in parallel.
-        compile_seconds: by how much the first run, which compiles, was longer than the median of the others.
+        compile_seconds: by how much the first runs, which compile, were longer than the median of the others.
         rate: control steps a second of the training loop; evaluations are left out.
-        physics_share: the time that the engine alone needs for the same control steps, over the time of the loop.
+        physics_share: the time that the engine alone needs for as many control steps of the script, over the time of
+            the loop. An estimate: training visits other states than the script, with other contacts.
     """
 
     engine: str
@@ -44,17 +47,17 @@ def measure_learning(config: Config, world: World, alone: Contestant, runs: int,
         InputError: a number of worlds that PPO cannot split into its minibatches.
     """
     each = alone.worlds * Ppo().unroll_length
-    ppo = Ppo(num_envs=alone.worlds, num_timesteps=(runs + 1) * each)
+    ppo = Ppo(num_envs=alone.worlds, num_timesteps=(runs + _COMPILING) * each)
     experiment = Config(name=config.name, engine=config.engine, data=config.data, ppo=ppo, checks=Checks(every=each))
     watch = _Watch(alone, seconds)
     learn(experiment, world, watch)
-    first, *later = watch.trained
+    first, later = watch.trained[:_COMPILING], watch.trained[_COMPILING:]
     rate = Rate.of(later)
-    shares = [t / a for t, a in zip(later, watch.alone[1:], strict=True)]
+    shares = [t / a for t, a in zip(later, watch.alone[_COMPILING:], strict=True)]
     return Learning(
         engine=world.env.engine.name,
         worlds=alone.worlds,
-        compile_seconds=each / first - each / rate.median,
+        compile_seconds=sum(each / r - each / rate.median for r in first),
         rate=rate,
         physics_share=Rate.of(shares).median,
     )
