@@ -1,0 +1,46 @@
+"""A tiny demonstration set, made once, and what is built on it: hands, an environment, frames in mid-grasp."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from envs.demonstrations.dataset import SetSettings, load_part, make_set, twins
+from envs.tracking import TrackingEnv
+from mjx_hand.motion.demonstration import Demonstration
+from mjx_hand.rigid.rigid_hand import RigidHand
+
+SETTINGS = SetSettings("pinch", people=2, heldout_people=1, trials=1, seed=3)
+
+
+@pytest.fixture(scope="session")
+def set_root(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("sets")
+
+
+@pytest.fixture(scope="session")
+def set_path(set_root) -> Path:
+    return make_set(SETTINGS, set_root)
+
+
+@pytest.fixture(scope="session")
+def demonstrations(set_path) -> list[Demonstration]:
+    return load_part(set_path, "train")
+
+
+@pytest.fixture(scope="session")
+def hands(demonstrations) -> Sequence[RigidHand]:
+    return twins(demonstrations)
+
+
+@pytest.fixture(scope="session")
+def env(demonstrations, hands) -> TrackingEnv:
+    return TrackingEnv(demonstrations, hands, "native")
+
+
+@pytest.fixture(scope="session")
+def lifted(env) -> list[np.ndarray]:
+    """For each demonstration, the frames in which the object is at least 2 cm above its start."""
+    pose, length = np.asarray(env.reference.object_pose), np.asarray(env.reference.length)
+    return [np.flatnonzero(p[:n, 2] - p[0, 2] > 0.02) for p, n in zip(pose, length, strict=True)]

@@ -1,0 +1,293 @@
+import copy
+import importlib.util
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+
+from envs.physics import make_engine
+from envs.physics.engine import check_family, default_engine
+from envs.physics.mjx import MjxEngine
+from envs.physics.native import NativeEngine, tuned
+from envs.scene import NUM_WRIST, demonstration_model
+from mjx_hand.errors import InputError
+from mjx_hand.hand.joints import NUM_HINGES
+from mjx_hand.pytree import replace
+
+SUBSTEPS, STEPS = 5, 6
+THING = slice(NUM_WRIST + NUM_HINGES, NUM_WRIST + NUM_HINGES + 3)
+
+
+@pytest.fixture(scope="module")
+def family(env):
+    return tuned(env.models)
+
+
+@pytest.fixture(scope="module")
+def rollout_inputs(env, lifted):
+    """Eight worlds, two hands: half in the air before the grasp, half pinching; replayed with a little noise."""
+    frames = np.concatenate([[2, 10], lifted[0][[0, 20]], [2, 10], lifted[1][[0, 20]]])
+    demos = np.repeat([0, 1], 4)
+    start = jax.tree.map(lambda leaf: np.asarray(leaf)[demos, frames], env._starts)
+    last = np.asarray(env.reference.length)[demos] - 1
+    controls = [np.asarray(env.reference.controls)[demos, np.minimum(frames + 1 + k, last)] for k in range(STEPS)]
+    noise = np.random.default_rng(0).normal(scale=0.002, size=(STEPS, 8, NUM_WRIST + NUM_HINGES))
+    low, high = env.models[0].actuator_ctrlrange.T
+    controls = np.clip(np.stack(controls) + noise, low, high).astype(np.float32)
+    pinching = np.tile([False, False, True, True], 2)
+    return (
+        jnp.asarray(demos, jnp.int32),
+        jnp.asarray(start.qpos),
+        jnp.asarray(start.qvel),
+        jnp.asarray(controls),
+        pinching,
+    )
+
+
+def rolled(engine):
+    """A jitted function from (variants, qpos, qvel, controls of each step) to the states after each step."""
+
+    @jax.jit
+    def roll(variant, qpos, qvel, controls):
+        state = jax.vmap(engine.reset)(variant, qpos, qvel, controls[0])
+
+        def step(state, ctrl):
+            state = jax.vmap(engine.step)(state, ctrl)
+            return state, state
+
+        return jax.lax.scan(step, state, controls)[1]
+
+    return roll
+
+
+@pytest.fixture(scope="module")
+def native_roll(family, rollout_inputs):
+    demos, qpos, qvel, controls, _ = rollout_inputs
+    return rolled(NativeEngine(family, SUBSTEPS))(demos, qpos, qvel, controls)
+
+
+def by_hand(model, qpos, qvel, controls):
+    """A plain loop over MuJoCo's own `mj_step`: positions, velocities and sensors after each control step."""
+    data = mujoco.MjData(model)
+    data.qpos, data.qvel = qpos, qvel
+    rows = []
+    for ctrl in controls:
+        data.ctrl = ctrl
+        for _ in range(SUBSTEPS):
+            mujoco.mj_step(model, data)
+        lookup = mujoco.MjData(model)
+        lookup.qpos = data.qpos
+        mujoco.mj_forward(model, lookup)
+        rows.append((data.qpos.copy(), data.qvel.copy(), lookup.sensordata.copy()))
+    return [np.stack(column) for column in zip(*rows, strict=True)]
+
+
+def carried(engine, memory, field):
+    """A field of the engine's memory, as the doubles that it holds."""
+    return np.ascontiguousarray(np.asarray(memory)).view(np.float64)[..., engine._slices[field]]
+
+
+def test_the_native_engine_is_mujoco_bit_for_bit(family, rollout_inputs, native_roll):
+    demos, qpos, qvel, controls, _ = rollout_inputs
+    engine = NativeEngine(family, SUBSTEPS)
+    for world, variant in enumerate(demos):
+        q, v, sensors = by_hand(family[variant], qpos[world], qvel[world], controls[:, world])
+        np.testing.assert_array_equal(carried(engine, native_roll.memory, "qpos")[:, world], q)
+        np.testing.assert_array_equal(carried(engine, native_roll.memory, "qvel")[:, world], v)
+        np.testing.assert_array_equal(native_roll.qpos[:, world], q.astype(np.float32))
+        # Sensors belong to this very state, not to the one a substep earlier.
+        np.testing.assert_allclose(native_roll.sensordata[:, world], sensors, atol=1e-6)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_native_rollouts_repeat_bit_for_bit(family, rollout_inputs, native_roll, threads):
+    demos, qpos, qvel, controls, _ = rollout_inputs
+    again = rolled(NativeEngine(family, SUBSTEPS, threads=threads))(demos, qpos, qvel, controls)
+    jax.tree.map(np.testing.assert_array_equal, again, native_roll)
+
+
+def test_native_worlds_do_not_depend_on_how_they_are_mapped(family, rollout_inputs, native_roll):
+    demos, qpos, qvel, controls, _ = rollout_inputs
+    engine = NativeEngine(family, SUBSTEPS)
+    for world in (0, 7):  # alone, not jitted, not scanned
+        state = engine.reset(demos[world], qpos[world], qvel[world], controls[0, world])
+        for k in range(2):
+            state = engine.step(state, controls[k, world])
+        np.testing.assert_array_equal(state.memory, native_roll.memory[1, world])
+    variant, q, qd, ctrl = (leaf.reshape(2, 4, *leaf.shape[1:]) for leaf in (demos, qpos, qvel, controls[0]))
+    nested = jax.vmap(jax.vmap(engine.reset))(variant, q, qd, ctrl)
+    nested = jax.vmap(jax.vmap(engine.step))(nested, ctrl)
+    np.testing.assert_array_equal(nested.memory.reshape(8, -1), native_roll.memory[0])
+
+
+def test_the_start_of_a_native_world_is_what_was_asked_for(family, rollout_inputs):
+    demos, qpos, qvel, controls, _ = rollout_inputs
+    state = jax.vmap(NativeEngine(family, SUBSTEPS).reset)(demos, qpos, qvel, controls[0])
+    np.testing.assert_array_equal(state.qpos, qpos)
+    np.testing.assert_array_equal(state.qvel, qvel)
+    assert not np.asarray(state.unstable).any()
+
+
+def assert_agrees(found, wanted, pinching, free, touching):
+    """How far (m) the object and tips are from where C MuJoCo has them: `free` where nothing is gripped."""
+    distance = np.linalg.norm(np.asarray(found.qpos - wanted.qpos)[..., THING], axis=-1).max(axis=0)
+    tips = np.abs(np.asarray(found.sensordata - wanted.sensordata)).max(axis=(0, 2))
+    assert not np.asarray(found.unstable).any()
+    assert distance[~pinching].max() < free
+    assert tips[~pinching].max() < free
+    for share, limit in touching.items():
+        assert np.quantile(distance[pinching], share) < limit
+
+
+def own_settings(engine):
+    """C MuJoCo on another engine's models, solver settings included."""
+    return NativeEngine(engine.models, SUBSTEPS)
+
+
+@pytest.fixture(scope="module")
+def mjx_engine(env):
+    engine = make_engine("mjx", env.models, SUBSTEPS)
+    assert isinstance(engine, MjxEngine)
+    return engine
+
+
+@pytest.fixture(scope="module")
+def mjx_roll(mjx_engine):
+    return rolled(mjx_engine)
+
+
+def test_mjx_agrees_with_mujoco_in_the_air_and_in_a_grip(mjx_engine, mjx_roll, rollout_inputs):
+    demos, qpos, qvel, controls, pinching = rollout_inputs
+    wanted = rolled(own_settings(mjx_engine))(demos, qpos, qvel, controls)
+    found = mjx_roll(demos, qpos, qvel, controls)
+    assert_agrees(found, wanted, pinching, free=2e-5, touching={0.5: 2e-4, 1.0: 5e-3})
+
+
+def test_mjx_worlds_each_run_their_own_model(mjx_engine, mjx_roll, rollout_inputs):
+    demos, qpos, qvel, controls, _ = rollout_inputs
+    swapped = mjx_roll(1 - demos, qpos, qvel, controls)
+    right = rolled(own_settings(mjx_engine))(1 - demos, qpos, qvel, controls)
+    wrong = rolled(own_settings(mjx_engine))(demos, qpos, qvel, controls)
+    tips = [np.abs(np.asarray(swapped.sensordata - other.sensordata)).max() for other in (right, wrong)]
+    assert tips[0] < 2e-3 < tips[1]
+
+
+def assert_resets_only(roll, rollout_inputs):
+    """World 3 is told a bad number in its second step, is flagged for it, and the others never notice."""
+    demos, qpos, qvel, controls, _ = rollout_inputs
+    usual = roll(demos, qpos, qvel, controls)
+    found = roll(demos, qpos, qvel, controls.at[1, 3, 7].set(jnp.nan))
+    flags = np.zeros((STEPS, 8))
+    flags[1, 3] = 1
+    np.testing.assert_array_equal(found.unstable, flags)
+    others = np.arange(8) != 3
+    np.testing.assert_array_equal(found.qpos[:, others], usual.qpos[:, others])
+    assert np.isfinite(np.asarray(found.qpos)).all()
+    assert np.isfinite(np.asarray(found.sensordata)).all()
+
+
+def assert_refuses_bad_starts(engine, rollout_inputs):
+    demos, qpos, qvel, controls, _ = rollout_inputs
+    for bad in (jnp.nan, 1e12):
+        state = jax.vmap(engine.reset)(demos, qpos, qvel.at[3, 28].set(bad), controls[0])
+        np.testing.assert_array_equal(state.unstable, np.arange(8) == 3)
+        assert np.isfinite(np.asarray(state.sensordata)).all()
+        np.testing.assert_array_equal(state.qvel[3], 0.0)
+
+
+def test_native_divergence_is_flagged_in_that_world_alone(family, rollout_inputs):
+    engine = NativeEngine(family, SUBSTEPS)
+    assert_resets_only(rolled(engine), rollout_inputs)
+    assert_refuses_bad_starts(engine, rollout_inputs)
+
+
+def test_mjx_divergence_is_flagged_in_that_world_alone(mjx_engine, mjx_roll, rollout_inputs):
+    assert_resets_only(mjx_roll, rollout_inputs)
+    assert_refuses_bad_starts(mjx_engine, rollout_inputs)
+
+
+@pytest.mark.slow
+def test_warp_agrees_with_mujoco_world_by_world(env, family, rollout_inputs, native_roll):
+    pytest.importorskip("warp", reason="the extra mjx-hand[warp] is not installed")
+    engine = make_engine("warp", env.models, SUBSTEPS)
+    roll = rolled(engine)
+    demos, qpos, qvel, controls, pinching = rollout_inputs
+    found = roll(demos, qpos, qvel, controls)
+    assert_agrees(found, native_roll, pinching, free=1e-5, touching={0.5: 5e-5, 1.0: 2e-3})
+    assert_resets_only(roll, rollout_inputs)
+    assert_refuses_bad_starts(engine, rollout_inputs)
+    # Other hands and objects: as the C engine has them, and not as the first model.
+    swapped, right = (r(1 - demos, qpos, qvel, controls) for r in (roll, rolled(own_settings(engine))))
+    tips = [np.abs(np.asarray(swapped.sensordata - other.sensordata)).max() for other in (right, native_roll)]
+    assert tips[0] < 2e-3 < tips[1]
+    # Nested maps are one call over all worlds.
+    variant, q, qd, ctrl = (leaf.reshape(2, 4, *leaf.shape[1:]) for leaf in (demos, qpos, qvel, controls[0]))
+    state = jax.jit(jax.vmap(jax.vmap(engine.step)))(jax.vmap(jax.vmap(engine.reset))(variant, q, qd, ctrl), ctrl)
+    np.testing.assert_allclose(state.qpos.reshape(8, -1), found.qpos[0], atol=1e-5)
+
+
+@pytest.mark.slow
+def test_warp_drops_objects_of_other_masses_and_sizes_as_mujoco_does(env, demonstrations, hands):
+    pytest.importorskip("warp", reason="the extra mjx-hand[warp] is not installed")
+    d = demonstrations[0]
+    big = replace(d, object=replace(d.object, size=d.object.size * 1.5, mass=d.object.mass * 4))
+    models = [demonstration_model(d, hands[0]), demonstration_model(big, hands[0])]
+    engine = make_engine("warp", models, SUBSTEPS)
+    q = np.stack([np.asarray(env._starts.qpos[0, 0])] * 2)
+    q[:, THING.stop - 1] += 0.03
+    controls = np.broadcast_to(q[:, : THING.start], (25, 2, THING.start)).astype(np.float32)
+    worlds = (jnp.array([0, 1], jnp.int32), jnp.asarray(q), jnp.zeros((2, models[0].nv)), jnp.asarray(controls))
+    found, wanted = (rolled(e)(*worlds) for e in (engine, own_settings(engine)))
+    height = np.asarray(wanted.qpos)[-1, :, THING.stop - 1]
+    assert height[1] - height[0] > 0.005  # the larger box rests higher
+    np.testing.assert_allclose(found.qpos, wanted.qpos, atol=2e-4)
+
+
+def test_warp_refuses_what_it_cannot_vary_by_world(env):
+    pytest.importorskip("warp", reason="the extra mjx-hand[warp] is not installed")
+    odd = copy.copy(env.models[0])
+    odd.sensor_type[0] = mujoco.mjtSensor.mjSENS_FRAMEQUAT
+    with pytest.raises(InputError, match=r"positions of sites.*native"):
+        make_engine("warp", [odd], SUBSTEPS)
+    other = copy.copy(env.models[0])
+    other.geom_priority[0] = 1
+    with pytest.raises(InputError, match=r"model 1 differs|cannot give each world its own geom_priority"):
+        make_engine("warp", [env.models[0], other], SUBSTEPS)
+
+
+def test_an_unknown_engine_is_named_with_the_valid_ones(family):
+    with pytest.raises(InputError, match=r"'bullet' is not known; valid: auto, native, mjx, warp"):
+        make_engine("bullet", family, SUBSTEPS)
+
+
+def test_an_engine_that_is_not_installed_says_how_to_install_it(family, monkeypatch):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"not installed.*pip install 'mjx-hand\[warp\]'"):
+        make_engine("warp", family, SUBSTEPS)
+
+
+@pytest.mark.parametrize(
+    ("backend", "warp", "engine"),
+    [("cpu", True, "native"), ("gpu", True, "warp"), ("gpu", False, "mjx"), ("tpu", True, "mjx")],
+)
+def test_the_default_engine_follows_the_machine(monkeypatch, backend, warp, engine):
+    monkeypatch.setattr(jax, "default_backend", lambda: backend)
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: object() if warp else None)
+    assert default_engine() == engine
+
+
+def test_a_family_is_of_one_structure(family):
+    with pytest.raises(InputError, match="at least one model"):
+        check_family([])
+    stranger = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
+    with pytest.raises(InputError, match="model 1 has nq = 0, model 0 has 33"):
+        make_engine("native", [family[0], stranger], SUBSTEPS)
+
+
+def test_mjx_refuses_models_that_it_would_compile_differently(env):
+    other = copy.copy(env.models[0])
+    other.geom_condim[:] = 1
+    with pytest.raises(InputError, match="model 1 differs from model 0 in structure"):
+        make_engine("mjx", [env.models[0], other], SUBSTEPS)

@@ -1,0 +1,101 @@
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from envs.grip import grip_offsets
+from envs.scene import NUM_WRIST, OBJECT, demonstration_model
+from mjx_hand.hand.joints import HINGES
+from mjx_hand.motion.demonstration import OBJECT_KINDS
+from mjx_hand.rigid.gains import Gains
+from mjx_hand.rigid.rigid_hand import stack_hands
+
+THUMB = [k for k, name in enumerate(HINGES) if name.startswith("thumb")]
+
+
+@pytest.fixture(scope="module")
+def in_hand(demonstrations, env):
+    """The object's pose in the first demonstration's wrist frame, every frame."""
+    d = demonstrations[0]
+    hand = Rotation.from_quat(d.motion.wrist_quaternion, scalar_first=True)
+    thing = Rotation.from_quat(d.object_pose[:, 3:], scalar_first=True)
+    position = hand.inv().apply(d.object_pose[:, :3] - d.motion.wrist_position)
+    return jnp.asarray((hand.inv() * thing).as_matrix(), jnp.float32), jnp.asarray(position, jnp.float32)
+
+
+@pytest.fixture(scope="module")
+def offsets(demonstrations, hands, in_hand):
+    """A jitted function from (position of the object in the hand, force) to the offsets of every frame."""
+    d, hand = demonstrations[0], stack_hands(hands[:1])
+    hand = jax.tree.map(lambda leaf: leaf[0], hand)
+    angles, size = jnp.asarray(d.motion.angles, jnp.float32), jnp.asarray(d.object.size, jnp.float32)
+
+    @jax.jit
+    def run(position, force):
+        return grip_offsets(angles, (in_hand[0], position), hand, d.object.kind, size, force, Gains())
+
+    return run
+
+
+def test_fingers_that_touch_nothing_get_no_offset(offsets, in_hand):
+    far = in_hand[1] + jnp.array([0.0, -0.5, 0.0])
+    assert np.abs(np.asarray(offsets(far, 8.0))).max() < 1e-6
+
+
+def test_before_the_grasp_and_for_idle_fingers_there_is_none(offsets, in_hand, lifted):
+    found = np.asarray(offsets(in_hand[1], 8.0))
+    assert np.abs(found[:5]).max() < 1e-3
+    idle = [k for k, name in enumerate(HINGES) if name.startswith(("ring", "pinky"))]
+    busy = [k for k, name in enumerate(HINGES) if name.startswith(("thumb", "index", "middle"))]
+    assert np.abs(found[lifted[0]][:, busy]).max(axis=1).min() > 0.02
+    assert np.abs(found[lifted[0]][:, idle]).max() < np.abs(found[lifted[0]][:, busy]).max() / 5
+
+
+def test_more_force_presses_harder_in_mujoco(demonstrations, hands, offsets, in_hand, env, lifted):
+    """The sum of the contact forces that the object feels from the fingers grows with the force asked for."""
+    d, frame = demonstrations[0], int(lifted[0][20])
+    model = demonstration_model(d, hands[0])
+    thing = model.geom(OBJECT).id
+    model.body_mass[model.body(OBJECT).id] *= 1000  # it stays where it is
+    model.body_inertia[model.body(OBJECT).id] *= 1000
+    model.opt.gravity[:] = 0
+    pressed = []
+    for force in (0.0, 4.0, 8.0):
+        extra = np.asarray(offsets(in_hand[1], force))[frame]
+        data = mujoco.MjData(model)
+        target = np.asarray(env.reference.targets[0, frame], float)
+        data.qpos[: len(target)], data.qpos[len(target) :] = target, d.object_pose[frame]
+        data.ctrl = np.concatenate([target[:NUM_WRIST], target[NUM_WRIST:] + extra])
+        for _ in range(100):
+            mujoco.mj_step(model, data)
+        wrench, total = np.zeros(6), 0.0
+        for k in range(data.ncon):
+            assert thing in data.contact[k].geom
+            mujoco.mj_contactForce(model, data, k, wrench)
+            total += wrench[0]
+        pressed.append(total)
+    assert pressed[0] + 3.0 < pressed[1] < pressed[2] - 3.0
+    assert 8.0 < pressed[2] < 32.0  # thumb and fingers: twice the force, give or take the pads' geometry
+
+
+def test_every_kind_of_object_has_finite_offsets(demonstrations, hands, in_hand):
+    d = demonstrations[0]
+    hand = jax.tree.map(lambda leaf: leaf[0], stack_hands(hands[:1]))
+    angles = jnp.asarray(d.motion.angles[-2:], jnp.float32)
+    where = tuple(leaf[-2:] for leaf in in_hand)
+    for kind in OBJECT_KINDS:
+        found = grip_offsets(angles, where, hand, kind, jnp.full(3, 0.017), 8.0, Gains())
+        assert np.isfinite(np.asarray(found)).all()
+        assert np.abs(np.asarray(found)[:, THUMB]).max() > 0.01
+
+
+def test_a_weak_joint_is_not_asked_for_more_than_it_has(demonstrations, hands, in_hand, offsets):
+    d = demonstrations[0]
+    hand = jax.tree.map(lambda leaf: leaf[0], stack_hands(hands[:1]))
+    weak = Gains(force_limit=np.full(20, 0.01))
+    args = (jnp.asarray(d.motion.angles[-2:], jnp.float32), tuple(leaf[-2:] for leaf in in_hand), hand, d.object.kind)
+    size = jnp.asarray(d.object.size, jnp.float32)
+    pressing = np.asarray(grip_offsets(*args, size, 8.0, weak)) - np.asarray(grip_offsets(*args, size, 0.0, weak))
+    assert (np.abs(pressing) <= 0.01 / weak.stiffness + 1e-6).all()
