@@ -25,7 +25,7 @@ def grip_offsets(
     rigid: RigidHand,
     kind: str,
     size: Float[Array, "3"],
-    force: float,
+    force: float | Float[Array, ""],
     gains: Gains,
 ) -> Float[Array, "t 20"]:
     """Hinge offsets (rad) that put each touching finger's last link on the object's surface and press it there.
