@@ -60,6 +60,7 @@ def test_more_force_presses_harder_in_mujoco(demonstrations, hands, offsets, in_
     thing = model.geom(OBJECT).id
     model.body_mass[model.body(OBJECT).id] *= 1000  # it stays where it is
     model.body_inertia[model.body(OBJECT).id] *= 1000
+    mujoco.mj_setConst(model, mujoco.MjData(model))
     model.opt.gravity[:] = 0
     pressed = []
     for force in (0.0, 4.0, 8.0):
