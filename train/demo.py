@@ -6,7 +6,6 @@ With a `config` of its own it makes the same report for any experiment.
 """
 
 import contextlib
-import platform
 import sys
 import time
 from collections.abc import Iterator
@@ -28,6 +27,7 @@ from mjx_hand.view import plots
 from mjx_hand.view.progress import clock
 from mjx_hand.view.renderer import RendererUnavailable
 from mjx_hand.view.report import Headline, Plot, Report, write_report
+from train.benchmark.machine import processor
 from train.config import Config, command
 from train.evaluate import POLICY, REPLAY, ZERO, Results, evaluate_checkpoint, show, tables, write_results
 from train.experiment import make_world
@@ -157,21 +157,11 @@ def _report(
             *((name, clock(seconds)) for name, seconds in timings),
             ("engine", f"{results.world.env.engine.name}, {config.ppo.num_envs} worlds"),
             ("seed", str(config.seed)),
-            ("machine", f"{_processor()}, {len(jax.devices())} {jax.default_backend()} device(s)"),
+            ("machine", f"{processor()}, {len(jax.devices())} {jax.default_backend()} device(s)"),
             ("versions", ", ".join(f"{name} {version(name)}" for name in ("mjx-hand", "mujoco", "jax", "brax"))),
         ],
         commands=[f"python -m train.demo config={config.name}", f"python -m train.evaluate config={config.name}"],
     )
-
-
-def _processor() -> str:
-    """The processor's name, as far as the system tells."""
-    information = Path("/proc/cpuinfo")
-    if information.is_file():
-        for line in information.read_text().splitlines():
-            if line.startswith("model name"):
-                return line.split(":", 1)[1].strip()
-    return platform.processor() or platform.machine()
 
 
 if __name__ == "__main__":

@@ -57,6 +57,8 @@ class SetSettings:
         for name in ("people", "heldout_people", "trials"):
             if getattr(self, name) < 1:
                 raise InputError(f"data.{name} is {getattr(self, name)}; it must be at least 1")
+        if self.seed < 0:
+            raise InputError(f"data.seed is {self.seed}; it must not be negative")
 
 
 def set_folder(settings: SetSettings, root: str | Path) -> Path:
@@ -85,7 +87,11 @@ def make_set(settings: SetSettings, root: str | Path, report: Report = lambda wh
             _make_part(settings, people, settings.seed + offset * 1_000_003, temporary / part, part, report)
         (temporary / "settings.json").write_text(json.dumps(dataclasses.asdict(settings), indent=1))
         temporary.chmod(0o755)
-        temporary.rename(folder)
+        try:
+            temporary.rename(folder)
+        except OSError:
+            if not folder.is_dir():  # another process may have made the same set meanwhile: then its is as good
+                raise
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
     return folder

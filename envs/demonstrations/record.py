@@ -4,6 +4,7 @@ What comes out is what a laboratory would have: the twin never sees the true ang
 """
 
 import dataclasses
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -19,6 +20,7 @@ from mjx_hand.capture.fit import fit_many
 from mjx_hand.capture.marker_set import included_marker_set
 from mjx_hand.capture.off_axis import add_off_axis_rotation
 from mjx_hand.capture.simulate import simulate_markers
+from mjx_hand.errors import InputError
 from mjx_hand.hand.model import HandModel
 from mjx_hand.motion.archive import load_arrays, save_arrays
 from mjx_hand.motion.demonstration import Demonstration
@@ -55,6 +57,20 @@ class CaptureSettings:
     object_noise: float = 0.0002
     rate: float = 50.0
     cutoff: float = CUTOFF
+
+    def __post_init__(self):
+        for name in ("fps", "rate", "cutoff"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                raise InputError(f"data.capture.{name} is {getattr(self, name)}; it must be a positive number")
+        for name in ("marker_noise", "off_axis", "object_noise"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
+                raise InputError(f"data.capture.{name} is {getattr(self, name)}; it must be a number of 0 or more")
+        if not 0 <= self.gap_fraction < 1:
+            raise InputError(f"data.capture.gap_fraction is {self.gap_fraction}; it must be at least 0 and below 1")
+        if self.cutoff >= self.rate / 2:
+            raise InputError(
+                f"data.capture.cutoff is {self.cutoff} Hz; it must be below half of data.capture.rate ({self.rate} Hz)"
+            )
 
 
 @dataclasses.dataclass(frozen=True)

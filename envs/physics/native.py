@@ -55,6 +55,11 @@ def tuned(models: Sequence[mujoco.MjModel]) -> list[mujoco.MjModel]:
     return copies
 
 
+def cores() -> int:
+    """Cores that this process may use, where the system tells, else all of the machine's."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 class NativeEngine:
     """See `envs.physics.engine.Engine`."""
 
@@ -63,7 +68,7 @@ class NativeEngine:
     def __init__(self, models: Sequence[mujoco.MjModel], substeps: int, threads: int | None = None):
         self.models = list(models)
         self.substeps = substeps
-        self._threads = threads or len(os.sched_getaffinity(0))
+        self._threads = threads or cores()
         self._batches: dict[int, batch.Batch] = {}
         self._running: dict[int, np.ndarray] = {}  # the variants that each cached batch is set to
         self._lock = threading.Lock()

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from envs.physics.native import cores
 from mjx_hand.motion.archive import replacing
 from mjx_hand.view import plots
 from train.benchmark.contestants import Contestant
 from train.benchmark.learning import Learning
-from train.benchmark.machine import accelerator, machine, processor, threads, versions
+from train.benchmark.machine import accelerator, machine, processor, versions
 from train.benchmark.timing import Rate
 
 SCHEMA = "mjx-hand/benchmark-engines/1"
@@ -119,7 +120,7 @@ def write(results: Results, folder: Path, options: Mapping[str, Any]) -> tuple[P
     """
     content = {
         "schema": SCHEMA,
-        "machine": {"processor": processor(), "cores": threads(), "accelerator": accelerator()},
+        "machine": {"processor": processor(), "cores": cores(), "accelerator": accelerator()},
         "versions": versions(*_PACKAGES),
         "options": options,
         **dataclasses.asdict(results),

@@ -14,12 +14,13 @@ from pathlib import Path
 
 from envs.demonstrations.dataset import SetSettings
 from envs.physics import ENGINES, default_engine
+from envs.physics.native import cores
 from mjx_hand.errors import InputError
 from mjx_hand.view.progress import counter
 from train.benchmark.contestants import Contestant, environment, open_rollout, physics, step_loop
 from train.benchmark.engine_report import Results, Row, text, write
 from train.benchmark.learning import Learning, measure_learning
-from train.benchmark.machine import accelerator, threads
+from train.benchmark.machine import accelerator
 from train.benchmark.timing import rates
 from train.config import Config
 from train.experiment import World, make_world
@@ -134,7 +135,7 @@ def _enter(made: Mapping[str, World], engines: Sequence[str], worlds: Sequence[i
             yield physics(made[name].env, count)
     yield step_loop(native)
     for count in worlds:
-        yield open_rollout(native, count, threads())
+        yield open_rollout(native, count, cores())
 
 
 def _learning(options: Options, made: Mapping[str, World], entered: Sequence[Contestant]) -> Learning:

@@ -7,12 +7,9 @@ from pathlib import Path
 
 import jax
 
+from envs.physics.native import cores
+
 _CPUINFO = Path("/proc/cpuinfo")  # Linux alone
-
-
-def threads() -> int:
-    """How many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def processor() -> str:
@@ -35,6 +32,6 @@ def versions(*packages: str) -> dict[str, str]:
 def machine(*packages: str) -> list[str]:
     """Hardware and versions as lines of text."""
     return [
-        f"{processor()}, {threads()} of {os.cpu_count()} cores; JAX on {accelerator() or 'the CPU'}",
+        f"{processor()}, {cores()} of {os.cpu_count()} cores; JAX on {accelerator() or 'the CPU'}",
         ", ".join(f"{name} {number}" for name, number in versions(*packages).items()),
     ]
