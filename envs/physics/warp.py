@@ -21,7 +21,8 @@ from envs.physics.native import tuned
 from envs.physics.recovery import recovered
 from mjx_hand.errors import InputError
 
-warp.config.log_level = warp.LOG_WARNING  # else a line for each of a hundred kernels
+# Else a line for each of a hundred kernels. Where Warp is not installed, its name means this module to type checkers.
+warp.config.log_level = warp.LOG_WARNING  # pyright: ignore[reportAttributeAccessIssue]
 
 _PLANE, _SPHERE = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_SPHERE
 _CAPSULE, _CYLINDER = mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER
