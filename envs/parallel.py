@@ -50,7 +50,7 @@ class ParallelEnv(Env):
         return state.replace(info=info)  # type: ignore[attr-defined]
 
     def _step(self, state: State, action: Float[Array, "26"]) -> State:
-        ours = {name: state.info[name] for name in ("truncation",)}
+        ours = {"truncation": state.info["truncation"]}
         stepped = self.env.step(state.replace(info=ours), action)  # type: ignore[attr-defined]
         now, later = jax.random.split(state.info["rng"])
         fresh = self.env.reset(now)

@@ -11,8 +11,8 @@ from envs.observation import wrist_rotation
 from envs.rollout import Rollouts
 from envs.scene import NUM_WRIST
 from envs.tracking import TrackingEnv, twin_of
-from mjx_hand.hand.joints import NUM_HINGES, TIP_LINKS
-from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics, stack_hands
+from mjx_hand.hand.joints import NUM_HINGES
+from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics, stack_hands, tip_positions
 
 _NUM_TARGETS = NUM_WRIST + NUM_HINGES
 
@@ -58,9 +58,8 @@ def make_roll_out(
         def one(q: Array, base: Array, hand: RigidHand) -> tuple[Array, Array]:
             rotation = wrist_rotation(q[3:NUM_WRIST], base)
             rot, pos = forward_kinematics(q[NUM_WRIST:_NUM_TARGETS], hand)
-            tips = jnp.array(TIP_LINKS)
-            ends = pos[tips] + jnp.einsum("fij,fj->fi", rot[tips], hand.tip_offset)
-            return pos @ rotation.T + base @ q[:3], ends @ rotation.T + base @ q[:3]
+            tips = tip_positions(rot, pos, hand)
+            return pos @ rotation.T + base @ q[:3], tips @ rotation.T + base @ q[:3]
 
         return jax.vmap(lambda qs, b, h: jax.lax.map(lambda q: one(q, b, h), qs, batch_size=64))(qpos, base, bodies)
 
