@@ -3,7 +3,7 @@
 import zipfile
 from pathlib import Path
 
-from mjx_hand.capture.datasets.dataset_format import dataset_formats
+from mjx_hand.capture.datasets.dataset_format import DatasetFormat, Request, dataset_formats
 from mjx_hand.errors import InputError
 from mjx_hand.motion import Motion
 from mjx_hand.motion.archive import open_arrays
@@ -12,28 +12,58 @@ _SHOWN = 6  # how many names of an unknown archive the message lists
 _MARKER_FILES = (".c3d", ".trc", ".tsv")
 
 
-def load_motion(path: str | Path) -> Motion:
+def load_motion(
+    path: str | Path,
+    *,
+    side: str | None = None,
+    sequence: str | None = None,
+    mano: str | Path | None = None,
+    fps: float | None = None,
+) -> Motion:
     """Read a motion; the format is recognised from the file itself (`mjx_hand/capture/datasets`, one module each).
 
+    Args:
+        path: a recording: a file, or a folder where a dataset's recording is one.
+        side: "right" or "left", where both hands are recorded.
+        sequence: the name of one recording, where there are several.
+        mano: a licensed MANO file of that side, where the poses need its components or mean.
+        fps: frames a second, where the recording does not say.
+
     Raises:
-        InputError: there is no such file, no format recognises it, or its contents are not sound.
+        InputError: there is no such file, no format recognises it, its contents are not sound, or it is not what was
+            asked for.
     """
     path = Path(path)
-    if not path.is_file():
-        found = "a folder" if path.is_dir() else "no such file"
-        raise InputError(f"{path}: {found}; give the path of a recording")
-    if path.stat().st_size == 0:
+    if side not in (None, "right", "left"):
+        raise InputError(f"side is {side!r}; give 'right' or 'left'")
+    request = Request(side=side, sequence=sequence, mano=Path(mano) if mano is not None else None, fps=fps)
+    if not path.exists():
+        raise InputError(f"{path}: no such file; give the path of a recording")
+    if path.is_file() and path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; give the path of a recording")
-    archive = path.suffix == ".npz" or zipfile.is_zipfile(path)
+    archive = path.is_file() and (path.suffix == ".npz" or zipfile.is_zipfile(path))
     arrays = open_arrays(path) if archive else {}
     formats = dataset_formats()
     for known in formats:
         if known.recognises(path, arrays):
-            return known.read(path, arrays)
+            return _asked_for(path, known, request, known.read(path, arrays, request))
     raise InputError(f"{path}: {_found(path, arrays)}; formats read: {', '.join(known.name for known in formats)}")
 
 
+def _asked_for(path: Path, known: DatasetFormat, request: Request, motion: Motion) -> Motion:
+    """`motion`, if nothing that the caller said is untrue of it."""
+    if request.sequence is not None and not known.has_sequences:
+        raise InputError(f"{path}: holds one recording; leave out sequence={request.sequence!r}")
+    if request.side not in (None, motion.side):
+        raise InputError(f"{path}: holds a {motion.side} hand; leave out side={request.side!r}")
+    if request.fps not in (None, motion.fps):
+        raise InputError(f"{path}: was recorded at {motion.fps:g} frames a second; leave out fps={request.fps:g}")
+    return motion
+
+
 def _found(path: Path, arrays: dict) -> str:
+    if path.is_dir():
+        return "a folder of no layout that is known here"
     if path.suffix.lower() in _MARKER_FILES:
         return "a marker recording, which needs a fit first"
     if "schema" in arrays:

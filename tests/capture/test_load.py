@@ -37,7 +37,7 @@ def test_a_format_is_added_by_one_file(tmp_path, monkeypatch):
         "import numpy as np\n"
         "from mjx_hand.capture.datasets.dataset_format import DatasetFormat\n"
         "from tests.capture.test_load import flat_motion\n"
-        "FORMAT = DatasetFormat('Still', lambda path, arrays: path.suffix == '.still', lambda p, a: flat_motion(7))\n"
+        "FORMAT = DatasetFormat('Still', lambda path, arrays: path.suffix == '.still', lambda p, a, r: flat_motion(7))\n"
     )
     monkeypatch.setattr(datasets, "__path__", [*datasets.__path__, str(tmp_path)])
     (tmp_path / "hand.still").write_text("still")

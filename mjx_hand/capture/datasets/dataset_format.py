@@ -1,16 +1,33 @@
-"""`DatasetFormat`: what one importer offers, and the list of all of them."""
+"""`DatasetFormat`: what one importer offers, what it is asked for, and the list of all of them."""
 
 import dataclasses
 import importlib
 import pkgutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
-
-import numpy as np
+from typing import Any
 
 from mjx_hand.motion import Motion
 
-Arrays = Mapping[str, np.ndarray]
+Contents = Mapping[str, Any]
+
+
+@dataclasses.dataclass(frozen=True)
+class Request:
+    """What a caller says of a recording that the recording leaves open; None is unsaid.
+
+    Attributes:
+        side: "right" or "left", where both hands are recorded.
+        sequence: the name of one recording, where a file or folder has several.
+        mano: a licensed MANO file of that side, where poses are PCA coefficients or relative to MANO's mean pose, and
+            for the wrist joint's own place.
+        fps: frames a second, where the recording does not say.
+    """
+
+    side: str | None = None
+    sequence: str | None = None
+    mano: Path | None = None
+    fps: float | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -19,13 +36,16 @@ class DatasetFormat:
 
     Attributes:
         name: one line for people: what the format is called and what marks it.
-        recognises: whether a file is of this format, from its path and, of an `.npz`, its arrays (else empty).
-        read: the motion in it; raises InputError where the file is of the format but not sound.
+        recognises: whether a file or folder is of this format, from its path and its contents: the named values of an
+            `.npz`, or of the dictionary in a `.npy` or pickle, read without running it; else empty.
+        read: the motion in it, as the request says; raises InputError where the file is of the format but not sound.
+        has_sequences: whether `Request.sequence` chooses among several.
     """
 
     name: str
-    recognises: Callable[[Path, Arrays], bool]
-    read: Callable[[Path, Arrays], Motion]
+    recognises: Callable[[Path, Contents], bool]
+    read: Callable[[Path, Contents, Request], Motion]
+    has_sequences: bool = False
 
 
 def dataset_formats() -> list[DatasetFormat]:

@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from mjx_hand.capture.datasets.dataset_format import Arrays, DatasetFormat
+from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import LINKS, PARENTS
 from mjx_hand.motion import Motion, check_motion
@@ -30,7 +30,7 @@ _NEEDED = ("mano", "joint_transforms", "joint_transform_order")
 _AGREEMENT = 1e-3
 
 
-def _recognises(path: Path, arrays: Arrays) -> bool:
+def _recognises(path: Path, arrays: Contents) -> bool:
     return all(name in arrays for name in _NEEDED)
 
 
@@ -43,7 +43,7 @@ def link_offsets_by_frame(transforms: Float[np.ndarray, "t 16 4 4"]) -> Float[np
     return offsets
 
 
-def ordered_transforms(path: Path, arrays: Arrays) -> Float[np.ndarray, "t 16 4 4"]:
+def ordered_transforms(path: Path, arrays: Contents) -> Float[np.ndarray, "t 16 4 4"]:
     """The joints' global transforms in the order of `LINKS`.
 
     Raises:
@@ -56,7 +56,7 @@ def ordered_transforms(path: Path, arrays: Arrays) -> Float[np.ndarray, "t 16 4 
     return transforms[:, [names.index(link) for link in LINKS]].astype(float)
 
 
-def _read(path: Path, arrays: Arrays) -> Motion:
+def _read(path: Path, arrays: Contents, request: Request) -> Motion:
     transforms = ordered_transforms(path, arrays)
     frames = len(transforms)
     mano = numbers(path, arrays, {"mano": (frames, 61)}, finite=False)["mano"].astype(float)

@@ -2,16 +2,16 @@
 
 from pathlib import Path
 
-from mjx_hand.capture.datasets.dataset_format import Arrays, DatasetFormat
+from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
 from mjx_hand.motion import Motion, load_motion_file
 from mjx_hand.motion.motion import SCHEMA
 
 
-def _recognises(path: Path, arrays: Arrays) -> bool:
+def _recognises(path: Path, arrays: Contents) -> bool:
     return str(arrays.get("schema", "")) == SCHEMA
 
 
-def _read(path: Path, arrays: Arrays) -> Motion:
+def _read(path: Path, arrays: Contents, request: Request) -> Motion:
     return load_motion_file(path)
 
 
