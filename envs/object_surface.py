@@ -26,6 +26,8 @@ def surface_points(thing: ObjectDescription, count: int = 500) -> Float[np.ndarr
         return size[0] * _on_unit_sphere(u, v)
     if thing.kind == "cylinder":
         return _on_cylinder(size[0], size[1], where, u, v)
+    if thing.kind == "capsule":
+        return _on_capsule(size[0], size[1], where, u, v)
     return _on_box(size, where, u, v)
 
 
@@ -43,6 +45,16 @@ def _on_cylinder(radius: float, half: float, where: np.ndarray, u: np.ndarray, v
     height = np.where(side, half * (2 * u - 1), np.where(top, half, -half))
     turn = 2 * np.pi * v
     return np.stack([across * np.cos(turn), across * np.sin(turn), height], axis=1)
+
+
+def _on_capsule(radius: float, half: float, where: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """`where` picks the side or the two half spheres, each as often as it is large: 4 pi r h and 4 pi r^2."""
+    side = where < half / (half + radius)
+    turn = 2 * np.pi * v
+    tube = np.stack([radius * np.cos(turn), radius * np.sin(turn), half * (2 * u - 1)], axis=1)
+    ends = radius * _on_unit_sphere(u, v)
+    ends[:, 2] += np.copysign(half, ends[:, 2])
+    return np.where(side[:, None], tube, ends)
 
 
 def _on_box(half: np.ndarray, where: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The twin's scene: the rigid hand on an actuated wrist, an object, the block it stands on, and a table."""
+"""The twin's scene: the rigid hand on an actuated wrist, an object, boxes that hold it up, and a table."""
 
 import mujoco
 import numpy as np
@@ -17,20 +17,21 @@ OBJECT, SUPPORT, TABLE = "object", "support", "table"
 MJX_CAPS = {"max_contact_points": 16, "max_geom_pairs": 12}
 NUM_WRIST = 6  # actuated wrist joints, before the hinges in qpos and ctrl
 
-# Who meets whom: (contype, conaffinity). The hand meets the object alone; the object also block and table.
+# Who meets whom: (contype, conaffinity). The hand meets the object alone; the object also boxes and table.
 _HAND_MEETS, _OBJECT_MEETS, _GROUND_MEETS = (1, 0), (2, 1), (0, 2)
 _GEOM = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
     "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
     "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
+    "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
 }
 
 
 def scene_model(
     rigid: RigidHand,
     thing: ObjectDescription,
-    support: Float[np.ndarray, "3"],
-    support_position: Float[np.ndarray, "3"],
+    support: Float[np.ndarray, "b 3"],
+    support_position: Float[np.ndarray, "b 3"],
     base_rotation: Float[np.ndarray, "3 3"],
     *,
     gains: Gains | None = None,
@@ -41,7 +42,8 @@ def scene_model(
     Args:
         rigid: the hand.
         thing: the object.
-        support, support_position: half extents and centre (m, world) of the block that the object stands on.
+        support, support_position: half extents and centres (m, world) of the boxes that hold the object up, if it does
+            not stand on the table.
         base_rotation: world_from_base; the wrist's slides run along the base's axes and its turns start from it, so
             that they stay far from the Euler angles' singularity for a demonstration that starts near it.
         gains: of the hand's joints.
@@ -82,15 +84,18 @@ def _contact(geom: mujoco.MjsGeom, friction: float, condim: int = 3) -> None:
 
 
 def _add_ground(
-    spec: mujoco.MjSpec, support: Float[np.ndarray, "3"], position: Float[np.ndarray, "3"], friction: float
+    spec: mujoco.MjSpec, support: Float[np.ndarray, "b 3"], position: Float[np.ndarray, "b 3"], friction: float
 ) -> None:
     table = spec.worldbody.add_geom(
         name=TABLE, type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1.0, 1.0, 0.01], rgba=(0.82, 0.82, 0.8, 1.0)
     )
-    block = spec.worldbody.add_geom(
-        name=SUPPORT, type=mujoco.mjtGeom.mjGEOM_BOX, size=support, pos=position, rgba=(0.5, 0.55, 0.6, 1.0)
-    )
-    for geom in (table, block):
+    boxes = [
+        spec.worldbody.add_geom(
+            name=f"{SUPPORT}{k}", type=mujoco.mjtGeom.mjGEOM_BOX, size=half, pos=centre, rgba=(0.5, 0.55, 0.6, 1.0)
+        )
+        for k, (half, centre) in enumerate(zip(support, position, strict=True))
+    ]
+    for geom in (table, *boxes):
         geom.contype, geom.conaffinity = _GROUND_MEETS
         _contact(geom, friction)
 

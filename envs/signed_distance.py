@@ -11,7 +11,7 @@ def signed_distance(kind: str, size: Float[Array, "*#b 3"], point: Float[Array, 
     """Distance (m) from a point in the object's frame to its surface, negative inside.
 
     Args:
-        kind: "box", "sphere" or "cylinder" (sizes as in `motion.ObjectDescription`).
+        kind: "box", "sphere", "cylinder" or "capsule" (sizes as in `motion.ObjectDescription`).
         size: the object's size (m), broadcast against the points.
         point: in the object's frame (m).
     """
@@ -23,7 +23,10 @@ def signed_distance(kind: str, size: Float[Array, "*#b 3"], point: Float[Array, 
         radial = _norm(point[..., :2]) - size[..., 0]
         axial = jnp.abs(point[..., 2]) - size[..., 1]
         return _rounded(jnp.stack([radial, axial], axis=-1))
-    raise InputError(f"object kind {kind!r} is not known; valid: box, sphere, cylinder")
+    if kind == "capsule":
+        beyond = jnp.maximum(jnp.abs(point[..., 2]) - size[..., 1], 0.0)
+        return _norm(jnp.concatenate([point[..., :2], beyond[..., None]], axis=-1)) - size[..., 0]
+    raise InputError(f"object kind {kind!r} is not known; valid: box, sphere, cylinder, capsule")
 
 
 def half_extents(kind: str, size: Float[Array | np.ndarray, "*b 3"]) -> Float[Array, "*b 3"]:
@@ -32,6 +35,8 @@ def half_extents(kind: str, size: Float[Array | np.ndarray, "*b 3"]) -> Float[Ar
         return jnp.stack([size[..., 0]] * 3, axis=-1)
     if kind == "cylinder":
         return jnp.stack([size[..., 0], size[..., 0], size[..., 1]], axis=-1)
+    if kind == "capsule":
+        return jnp.stack([size[..., 0], size[..., 0], size[..., 0] + size[..., 1]], axis=-1)
     return jnp.asarray(size)
 
 

@@ -1,6 +1,6 @@
 """Demonstration sets on disk: made once by simulated capture, then read back.
 
-A set is a folder of `train/NNN.npz` and `heldout/NNN.npz` (schema mjx-hand/demonstration/1). Beside each stand the
+A set is a folder of `train/NNN.npz` and `heldout/NNN.npz` (schema mjx-hand/demonstration/2). Beside each stand the
 motion that was fitted to its markers, `NNN.motion.npz` (which `mjx-hand retarget` reads), and its truth,
 `NNN.truth.npz`. Training and held-out demonstrations come from different people, object sizes and seeds.
 """
@@ -26,7 +26,7 @@ from mjx_hand.rigid.build import build_rigid_hand
 from mjx_hand.rigid.rigid_hand import RigidHand
 
 PARTS = ("train", "heldout")
-_VERSION = 1  # of the generator: a change that makes other demonstrations of the same settings raises it
+_VERSION = 2  # of the generator: a change that makes other demonstrations of the same settings raises it
 _SHAPE_LIMIT = 2.0  # standard deviations
 
 Report = Callable[[str, float], None]  # what is being done, and the share of it done
@@ -62,8 +62,9 @@ class SetSettings:
 
 
 def set_folder(settings: SetSettings, root: str | Path) -> Path:
-    """Where a set of these settings lives below `root`: its name carries a digest of all settings."""
-    content = json.dumps([_VERSION, dataclasses.asdict(settings)], sort_keys=True)
+    """Where a set of these settings lives below `root`: its name carries a digest of all settings and of the type."""
+    made_of = [_VERSION, dataclasses.asdict(settings), dataclasses.asdict(grasp_type(settings.grasp))]
+    content = json.dumps(made_of, sort_keys=True)
     return Path(root) / f"{settings.grasp}-{hashlib.sha256(content.encode()).hexdigest()[:10]}"
 
 
@@ -112,8 +113,7 @@ def _make_part(settings: SetSettings, people: int, seed: int, folder: Path, part
         hands,
         shapes,
         model,
-        np.array(grasp.support),
-        grasp.name,
+        grasp,
         seed,
         settings.capture,
         progress=lambda share: report(f"fitting {part} recordings", share),

@@ -14,7 +14,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from envs.demonstrations.trials import Trial
+from envs.demonstrations.trials import Trial, support_boxes
+from envs.grasps import GraspType
 from envs.scene import TIMESTEP
 from mjx_hand.capture.fit import fit_many
 from mjx_hand.capture.marker_set import included_marker_set
@@ -104,8 +105,7 @@ def record_trials(
     hands: Sequence[RigidHand],
     shapes: Float[np.ndarray, "p s"],
     model: HandModel,
-    support: Float[np.ndarray, "3"],
-    grasp: str,
+    grasp: GraspType,
     seed: int,
     settings: CaptureSettings | None = None,
     progress: Callable[[float], None] | None = None,
@@ -116,8 +116,7 @@ def record_trials(
         trials: what was performed.
         hands, shapes: the true hand and its shape coefficients, by person.
         model: the hand model that both the people and the fit use.
-        support: half extents of the block the object stood on.
-        grasp: name of the grasp type.
+        grasp: their type.
         seed: of noise, gaps and off-axis rotations.
         settings: of the capture system.
         progress: told the share of the fitting done.
@@ -140,20 +139,21 @@ def record_trials(
             )
         )
     out = []
+    support, support_position = support_boxes(grasp)
     for k, (motion, _) in enumerate(fit_many(recordings, model, markers, progress=progress)):
         trial, fitted = trials[k], resample_motion(motion, settings.rate)
         twin = build_rigid_hand(model, fitted.shape)
         joints = low_pass(retarget_sequence(fitted, twin), settings.cutoff)
         truth = _truth(trial, shapes[trial.person], joints.num_frames, settings.rate)
-        source = f"simulated {grasp}, person {trial.person}, seed {seed}.{k}"
+        source = f"simulated {grasp.name}, person {trial.person}, seed {seed}.{k}"
         demonstration = Demonstration(
             motion=replace(joints, source=source),
             object_pose=_measured(truth.object_pose, settings, seeds[k][2]),
             object=trial.object,
             support=support,
-            support_position=trial.support_position,
+            support_position=support_position,
             shape=fitted.shape,
-            grasp=grasp,
+            grasp=grasp.name,
             source=source,
         )
         out.append(Recorded(replace(fitted, source=source), demonstration, truth))

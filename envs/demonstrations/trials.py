@@ -8,9 +8,10 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.perform import Performance, perform
-from envs.demonstrations.posture import Posture, opening_angles, solve_postures, squeeze_angles
+from envs.demonstrations.posture import Posture, opened_angles, solve_postures, squeeze_angles
 from envs.demonstrations.script import GraspMotion, Tempo, scripted_targets
 from envs.grasps import GraspType
 from envs.physics.native import tuned
@@ -32,13 +33,11 @@ class Trial:
     Attributes:
         person: index of the hand that did it.
         object: what was grasped.
-        support_position: centre of the block that it stood on.
         angles, wrist_position, wrist_rotation, object_pose: as in `Performance`, one trial's.
     """
 
     person: int
     object: ObjectDescription
-    support_position: Float[np.ndarray, "3"]
     angles: Float[np.ndarray, "t 20"]
     wrist_position: Float[np.ndarray, "t 3"]
     wrist_rotation: Float[np.ndarray, "t 3 3"]
@@ -99,16 +98,15 @@ def _attempt(
     if not good:
         return []
     gains = Gains()
-    motions, models, starts, supports = [], [], [], []
+    motions, models, starts = [], [], []
+    lying = np.array(grasp.object_rotation)
+    upright = Rotation.from_matrix(lying).as_quat(scalar_first=True)
     for k in good:
-        centre = np.array(
-            [0.0, 0.0, 2 * grasp.support[2] + half_extents(things[k].kind, jnp.asarray(things[k].size))[2]]
-        )
-        supports.append(np.array([0.0, 0.0, grasp.support[2]]))
-        starts.append(np.concatenate([centre, [1.0, 0.0, 0.0, 0.0]]))
+        reach = np.abs(lying[2]) @ np.asarray(half_extents(things[k].kind, jnp.asarray(things[k].size)))
+        centre = np.array([0.0, 0.0, grasp.rest + reach])
+        starts.append(np.concatenate([centre, upright]))
         motions.append(_draw_motion(grasp, postures[k], centre, hands[k], gains, rng))
-        support = np.array(grasp.support)
-        models.append(scene_model(hands[k], things[k], support, supports[-1], postures[k].rotation, gains=gains))
+        models.append(scene_model(hands[k], things[k], *support_boxes(grasp), postures[k].rotation, gains=gains))
     bases = np.stack([postures[k].rotation for k in good])
     done = perform(
         tuned(models),
@@ -117,21 +115,20 @@ def _attempt(
         np.stack(starts),
         np.array([motion.tempo.end("lift") for motion in motions]),
     )
-    return [
-        _trial(done, row, people[k], things[k], supports[row], motions[row].tempo)
-        for row, k in enumerate(good)
-        if done.held[row]
-    ]
+    return [_trial(done, row, people[k], things[k], motions[row].tempo) for row, k in enumerate(good) if done.held[row]]
 
 
-def _trial(
-    done: Performance, row: int, person: int, thing: ObjectDescription, support: np.ndarray, tempo: Tempo
-) -> Trial:
+def support_boxes(grasp: GraspType) -> tuple[Float[np.ndarray, "b 3"], Float[np.ndarray, "b 3"]]:
+    """Half extents and centres (m) of the boxes that hold the type's objects up."""
+    halves, centres = [box.half for box in grasp.support], [box.centre for box in grasp.support]
+    return np.array(halves).reshape(-1, 3), np.array(centres).reshape(-1, 3)
+
+
+def _trial(done: Performance, row: int, person: int, thing: ObjectDescription, tempo: Tempo) -> Trial:
     steps = round(tempo.duration / TIMESTEP)
     return Trial(
         person=person,
         object=thing,
-        support_position=support,
         angles=done.angles[row, :steps],
         wrist_position=done.wrist_position[row, :steps],
         wrist_rotation=done.wrist_rotation[row, :steps],
@@ -158,14 +155,14 @@ def _draw_motion(
     rng: np.random.Generator,
 ) -> GraspMotion:
     closed = np.asarray(posture.angles)
-    opened = np.clip(closed + opening_angles(grasp, posture), hand.hinge_lower, hand.hinge_upper)
+    opened = np.clip(opened_angles(grasp.closing, posture), hand.hinge_lower, hand.hinge_upper)
     heading = rng.uniform(0, 2 * np.pi)
     way = rng.uniform(*grasp.carry)
     axis = rng.normal(size=3)
     return GraspMotion(
         open_angles=opened,
         closed_angles=closed,
-        squeeze_angles=squeeze_angles(grasp, posture, gains),
+        squeeze_angles=squeeze_angles(grasp.closing, posture, gains),
         position=centre + np.asarray(posture.position),
         rotation=np.asarray(posture.rotation),
         approach=np.array(grasp.approach) + rng.uniform(-0.005, 0.005, 3),

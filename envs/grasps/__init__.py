@@ -3,10 +3,10 @@
 import importlib
 import pkgutil
 
-from envs.grasps.grasp_type import Contact, GraspType
+from envs.grasps.grasp_type import Box, Contact, GraspType, Pads, Wrap
 from mjx_hand.errors import InputError
 
-__all__ = ["Contact", "GraspType", "grasp_names", "grasp_type"]
+__all__ = ["Box", "Contact", "GraspType", "Pads", "Wrap", "grasp_names", "grasp_type"]
 
 
 def grasp_names() -> list[str]:

@@ -12,14 +12,14 @@ from mjx_hand.motion.joint_motion import JointMotion, joint_motion_of
 from mjx_hand.motion.layout import numbers, text
 from mjx_hand.pytree import pytree, static
 
-SCHEMA = "mjx-hand/demonstration/1"
-OBJECT_KINDS = ("box", "sphere", "cylinder")
+SCHEMA = "mjx-hand/demonstration/2"
+OBJECT_KINDS = ("box", "sphere", "cylinder", "capsule")
 _LAYOUT: dict[str, tuple[int | str, ...]] = {
     "object_size": (3,),
     "object_mass": (),
     "object_friction": (),
-    "support": (3,),
-    "support_position": (3,),
+    "support": ("b", 3),
+    "support_position": ("b", 3),
     "shape": ("s",),
 }
 
@@ -29,7 +29,8 @@ class ObjectDescription:
     """A rigid object of simple shape; metres, kilograms.
 
     Attributes:
-        size: half extents of a box; (radius, 0, 0) of a sphere; (radius, half height, 0) of a cylinder along z.
+        size: half extents of a box; (radius, 0, 0) of a sphere; (radius, half height, 0) of a cylinder along z;
+            (radius, half length without the round ends, 0) of a capsule along z.
         mass: uniform density is assumed.
         friction: sliding coefficient.
         kind: one of `OBJECT_KINDS`.
@@ -49,8 +50,8 @@ class Demonstration:
         motion: the twin's hinge angles and wrist poses, at the control rate.
         object_pose: position and quaternion of the object's frame, a row a frame.
         object: what is manipulated.
-        support: half extents of the block that the object stands on at first.
-        support_position: centre of that block.
+        support: half extents of the boxes that hold the object up at first, if it does not stand on the table.
+        support_position: centres of those boxes.
         shape: MANO shape coefficients of the person, from which the twin's hand is built.
         grasp: name of the grasp type.
         source: provenance, one line.
@@ -59,8 +60,8 @@ class Demonstration:
     motion: JointMotion
     object_pose: Float[np.ndarray, "t 7"]
     object: ObjectDescription
-    support: Float[np.ndarray, "3"]
-    support_position: Float[np.ndarray, "3"]
+    support: Float[np.ndarray, "b 3"]
+    support_position: Float[np.ndarray, "b 3"]
     shape: Float[np.ndarray, "s"]
     grasp: str = static()
     source: str = static(default="")
@@ -71,7 +72,7 @@ class Demonstration:
 
 
 def save_demonstration(demonstration: Demonstration, path: str | Path) -> None:
-    """Write as `.npz` (schema mjx-hand/demonstration/1)."""
+    """Write as `.npz` (schema mjx-hand/demonstration/2)."""
     d, m = demonstration, demonstration.motion
     save_arrays(
         path,

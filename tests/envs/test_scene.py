@@ -31,7 +31,7 @@ def test_joints_and_actuators_run_in_one_order(model):
 def test_only_the_object_is_touched(model):
     """Every pair that MuJoCo would test has the object in it: no finger meets a finger, the block or the table."""
     thing = model.geom(OBJECT).id
-    ground = {model.geom(SUPPORT).id, model.geom(TABLE).id}
+    ground = {model.geom(f"{SUPPORT}0").id, model.geom(TABLE).id}
     partners = set()
     for i in range(model.ngeom):
         for j in range(i + 1, model.ngeom):
@@ -56,7 +56,7 @@ def test_the_object_has_the_mass_friction_and_size_that_were_asked_for(model, de
     thing = demonstrations[0].object
     assert model.body(OBJECT).mass[0] == pytest.approx(thing.mass)
     np.testing.assert_allclose(model.geom(OBJECT).size, thing.size)
-    for name in (OBJECT, SUPPORT, TABLE):
+    for name in (OBJECT, f"{SUPPORT}0", TABLE):
         assert model.geom(name).friction[0] == pytest.approx(thing.friction)
 
 
@@ -68,7 +68,7 @@ def test_a_cube_rests_on_its_block(model, demonstrations):
     data.qpos[-7:] = d.object_pose[0]
     for _ in range(250):
         mujoco.mj_step(model, data)
-    top = d.support_position[2] + d.support[2]
+    top = d.support_position[0, 2] + d.support[0, 2]
     assert data.qpos[-5] == pytest.approx(top + d.object.size[2], abs=1e-3)
 
 
@@ -110,5 +110,5 @@ def test_a_demonstrations_poses_are_reached_by_the_scene(model, demonstrations, 
 
 def test_an_unknown_kind_of_object_is_refused(hands):
     cone = ObjectDescription(kind="cone", size=np.ones(3), mass=0.1, friction=1.0)
-    with pytest.raises(InputError, match=r"'cone' is not known; valid: box, sphere, cylinder"):
-        scene_model(hands[0], cone, np.ones(3), np.zeros(3), np.eye(3))
+    with pytest.raises(InputError, match=r"'cone' is not known; valid: box, sphere, cylinder, capsule"):
+        scene_model(hands[0], cone, np.ones((1, 3)), np.zeros((1, 3)), np.eye(3))
