@@ -38,16 +38,21 @@ _KNOWN = {
     "numpy.matrix",
     "numpy.ndarray",
     *(f"scipy.sparse._{kind}.{kind}_{form}" for kind in ("csc", "csr") for form in ("matrix", "array")),
+    # PyTorch's tensors, which `inert_tensor` reads
+    "collections.OrderedDict",
+    "torch._utils._rebuild_tensor_v2",
+    "torch.storage._load_from_bytes",
+    *(f"torch.{kind}Storage" for kind in ("Half", "Float", "Double", "Int", "Long", "Short", "Char", "Byte", "Bool")),
 }
 _LARGEST = 10**8  # entries; no array of a hand comes near
 
 
-class _Record:
+class Record:
     """What a name was called with (`args`) and then given as its state."""
 
     name = ""
 
-    def __new__(cls, *args: Any, **_: Any) -> "_Record":
+    def __new__(cls, *args: Any, **_: Any) -> "Record":
         record = object.__new__(cls)
         record.args = args
         record.state = None
@@ -66,19 +71,45 @@ class _Forbidden(Exception):
 
 
 # The pure-Python unpickler: the C one reserves memory for whatever memo index a damaged file names.
-class _Reader(pickle._Unpickler):
-    def find_class(self, module: str, name: str) -> type[_Record]:
+class Reader(pickle._Unpickler):
+    """An unpickler whose names are records."""
+
+    def find_class(self, module: str, name: str) -> type[Record]:
         full = f"{_MOVED.get(module, module)}.{name}"
         if full not in _KNOWN:
             raise _Forbidden(f"{module}.{name}")
-        return type(name, (_Record,), {"name": full})  # a new class each time, so that no file can alter the next one's
+        return type(name, (Record,), {"name": full})  # a new class each time, so that no file can alter the next one's
 
     def persistent_load(self, pid: Any) -> Any:
         raise _Forbidden("an external object (persistent id)")
 
 
+def unpickle(data: bytes, where: str, whose: str, source: str) -> Any:
+    """What a pickle holds, its objects left as records for `array`.
+
+    Args:
+        data: the file's bytes.
+        where: the file's name, for messages.
+        whose: what the file should be, for messages: "hand model".
+        source: where to get a sound one, for messages.
+
+    Raises:
+        InputError: the pickle names something outside the list, or is damaged.
+    """
+    try:
+        return Reader(io.BytesIO(data), encoding="latin1").load()
+    except _Forbidden as error:
+        raise InputError(
+            f"{where}: refused, since it names {str(error)!r}, which no {whose} needs and which could run code; "
+            f"nothing was run; get the file from {source}"
+        ) from None
+    except Exception as error:  # damaged bytes raise anything at all
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError(f"{where}: not a readable pickle ({reason}); it may be truncated, copy it again") from None
+
+
 def read(data: bytes, where: str) -> dict[str, Any]:
-    """The dictionary that a pickle holds, its objects left as records for `array`.
+    """The dictionary that a hand model's pickle holds, its objects left as records for `array`.
 
     Args:
         data: the file's bytes.
@@ -87,16 +118,7 @@ def read(data: bytes, where: str) -> dict[str, Any]:
     Raises:
         InputError: the pickle names something outside the list, is damaged, or holds no dictionary.
     """
-    try:
-        loaded = _Reader(io.BytesIO(data), encoding="latin1").load()
-    except _Forbidden as error:
-        raise InputError(
-            f"{where}: refused, since it names {str(error)!r}, which no hand model needs and which could run code; "
-            "nothing was run; get the file from https://mano.is.tue.mpg.de"
-        ) from None
-    except Exception as error:  # damaged bytes raise anything at all
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError(f"{where}: not a readable pickle ({reason}); it may be truncated, copy it again") from None
+    loaded = unpickle(data, where, "hand model", "https://mano.is.tue.mpg.de")
     if not isinstance(loaded, dict):
         raise InputError(f"{where}: holds a {type(loaded).__name__}, expected a MANO file's dictionary of arrays")
     return loaded
@@ -113,7 +135,7 @@ def array(value: Any) -> np.ndarray:
     """
     if isinstance(value, np.ndarray | int | float):
         return np.asarray(value)
-    if not isinstance(value, _Record):
+    if not isinstance(value, Record):
         raise ValueError(f"a {type(value).__name__}, not an array")
     match value.name.rsplit(".", 1)[-1]:
         case "_reconstruct":
@@ -142,12 +164,17 @@ def array(value: Any) -> np.ndarray:
             raise ValueError(f"a {other}, not an array")
 
 
-def _bytes(data: Any) -> bytes:
+def bytes_of(data: Any) -> bytes:
+    """The bytes that a value stands for, however its protocol writes them.
+
+    Raises:
+        ValueError: it stands for something else.
+    """
     if isinstance(data, bytes | bytearray):
         return bytes(data)
     if isinstance(data, str):  # a Python 2 string
         return data.encode("latin1")
-    if isinstance(data, _Record) and data.name == "_codecs.encode":
+    if isinstance(data, Record) and data.name == "_codecs.encode":
         text, codec = data.args
         if codec == "latin1" and isinstance(text, str):
             return text.encode("latin1")
@@ -155,18 +182,18 @@ def _bytes(data: Any) -> bytes:
 
 
 def _from_bytes(data: Any, dtype: Any, shape: Any, order: str) -> np.ndarray:
-    if not isinstance(dtype, _Record) or dtype.name != "numpy.dtype":
+    if not isinstance(dtype, Record) or dtype.name != "numpy.dtype":
         raise ValueError("an array without a number type")
     code = dtype.args[0]
     byte_order, *structure = dtype.state[1:5] if dtype.state else ("=",)
     if not re.fullmatch("[fiu][1248]|b1", code) or any(part is not None for part in structure):
         raise ValueError(f"an array of type {code!r}, not of plain numbers")
-    native = np.frombuffer(_bytes(data), np.dtype(code).newbyteorder(byte_order)).astype(code)
+    native = np.frombuffer(bytes_of(data), np.dtype(code).newbyteorder(byte_order)).astype(code)
     return native.reshape(_shape(shape), order="F" if order == "F" else "C")
 
 
 def _shape(shape: Any) -> tuple[int, ...]:
-    return tuple(int(n) for n in (array(shape) if isinstance(shape, _Record) else shape))
+    return tuple(int(n) for n in (array(shape) if isinstance(shape, Record) else shape))
 
 
 def _dense(state: dict[str, Any], by_column: bool) -> np.ndarray:

@@ -89,7 +89,7 @@ def stack_global(module: str, name: str) -> bytes:
         ("copyreg", "__newobj__"),
         ("copyreg", "add_extension"),
         ("_codecs", "lookup"),
-        ("mjx_hand.hand.inert_pickle", "_Reader"),
+        ("mjx_hand.hand.inert_pickle", "Reader"),
         ("__main__", "x"),
         ("", ""),
     ],
