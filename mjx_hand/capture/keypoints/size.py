@@ -1,0 +1,44 @@
+"""Whether keypoints are as big as a hand, and in which unit they would be."""
+
+import numpy as np
+from jaxtyping import Float
+
+from mjx_hand.capture.keypoints.bone_lengths import NUM_FINGER_BONES, lengths
+from mjx_hand.capture.keypoints.skeleton import rest_keypoints
+from mjx_hand.errors import InputError
+from mjx_hand.hand.model import HandModel
+
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}  # metres in each
+BIGGEST = 1.8  # times the mean hand, or the other way its share; small children's hands are half an adult's
+
+
+def unit_factor(name: str, unit: str) -> float:
+    """Metres in one `unit`.
+
+    Raises:
+        InputError: the unit is unknown; `name` says where it stands.
+    """
+    if unit not in UNITS:
+        raise InputError(f"{name}: unit is {unit!r}; known: {', '.join(UNITS)}")
+    return UNITS[unit]
+
+
+def check_size(name: str, hand: HandModel, observed: Float[np.ndarray, "n"]) -> None:
+    """Refuse bone lengths (m) that no hand has.
+
+    Raises:
+        InputError: they are too big or too small, with the unit that would explain them.
+    """
+    fingers = slice(0, NUM_FINGER_BONES)
+    ratio = float(np.nanmedian(observed[fingers] / lengths(rest_keypoints(hand)[0])[fingers]))
+    if 1 / (1.4 * BIGGEST) < ratio < BIGGEST:
+        return
+    for unit, metres in UNITS.items():
+        if unit != "m" and 1 / BIGGEST < ratio * metres < BIGGEST:
+            raise InputError(
+                f"{name}: a hand {ratio:.3g} times too big, so its positions are in {unit}; say unit={unit!r}"
+            )
+    what = f"{ratio:.3g} times too big" if ratio > 1 else f"{1 / ratio:.3g} times too small"
+    raise InputError(
+        f"{name}: a hand {what}; give positions in metres (of MediaPipe its world landmarks, not the image's)"
+    )
