@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from mjx_hand.errors import InputError
-from mjx_hand.hand.joints import NUM_BALL_JOINTS, NUM_LINKS
+from mjx_hand.hand.joints import FINGERS, NUM_BALL_JOINTS, NUM_LINKS
 from mjx_hand.motion.archive import load_arrays, save_arrays
 from mjx_hand.motion.layout import numbers, text
 from mjx_hand.pytree import pytree, static
@@ -20,6 +20,7 @@ LAYOUT: dict[str, tuple[int | str, ...]] = {
     "shape": ("s",),
     "valid": ("t",),
 }
+_OFFSETS = {"link_offset": NUM_LINKS, "tip_offset": len(FINGERS)}  # a recording may have them
 
 
 @pytree
@@ -34,6 +35,7 @@ class Motion:
         wrist_quaternion: world from hand frame, wxyz.
         shape: MANO shape coefficients, one set for the whole sequence.
         link_offset: the subject's own joint centres relative to each parent's (m), or None to use the shape's.
+        tip_offset: the subject's own finger tips in the last links' frames (m, in the order of `FINGERS`), or None.
         valid: whether the frame was recorded (False in gaps).
         side: "right" or "left".
         source: provenance, one line.
@@ -46,6 +48,7 @@ class Motion:
     shape: Float[np.ndarray, "s"]
     valid: Bool[np.ndarray, "t"]
     link_offset: Float[np.ndarray, "16 3"] | None = None
+    tip_offset: Float[np.ndarray, "5 3"] | None = None
     side: str = static(default="right")
     source: str = static(default="")
 
@@ -98,9 +101,10 @@ def check_motion(motion: Motion, name: str = "") -> Motion:
         raise InputError(f"{name}: frame {worst}'s wrist_quaternion has length {length[worst]:.3g}, expected 1 (wxyz)")
     if np.ndim(motion.shape) != 1 or not np.isfinite(motion.shape).all():
         raise InputError(f"{name}: shape has dimensions {np.shape(motion.shape)}; expected a list of finite numbers")
-    offset = motion.link_offset
-    if offset is not None and (np.shape(offset) != (NUM_LINKS, 3) or not np.isfinite(offset).all()):
-        raise InputError(f"{name}: link_offset has shape {np.shape(offset)}; expected ({NUM_LINKS}, 3), all finite")
+    for field, rows in _OFFSETS.items():
+        offset = getattr(motion, field)
+        if offset is not None and (np.shape(offset) != (rows, 3) or not np.isfinite(offset).all()):
+            raise InputError(f"{name}: {field} has shape {np.shape(offset)}; expected ({rows}, 3), all finite")
     r = motion.rotations[good]
     off = np.abs(r @ np.swapaxes(r, -1, -2) - np.eye(3)).max(axis=(1, 2, 3))
     flipped = np.linalg.det(r).min(axis=1) < 0
@@ -122,8 +126,9 @@ def save_motion(motion: Motion, path: str | Path) -> None:
         "side": motion.side,
         "source": motion.source,
     }
-    if motion.link_offset is not None:
-        arrays["link_offset"] = motion.link_offset
+    for field in _OFFSETS:
+        if getattr(motion, field) is not None:
+            arrays[field] = getattr(motion, field)
     save_arrays(path, SCHEMA, arrays)
 
 
@@ -135,7 +140,7 @@ def load_motion_file(path: str | Path) -> Motion:
     """
     a = load_arrays(path, SCHEMA)
     n = numbers(path, a, LAYOUT)
-    offset = numbers(path, a, {"link_offset": (NUM_LINKS, 3)})["link_offset"] if "link_offset" in a else None
+    offsets = numbers(path, a, {field: (rows, 3) for field, rows in _OFFSETS.items() if field in a})
     return check_motion(
         Motion(
             fps=float(n["fps"]),
@@ -144,7 +149,8 @@ def load_motion_file(path: str | Path) -> Motion:
             wrist_quaternion=n["wrist_quaternion"],
             shape=n["shape"],
             valid=n["valid"].astype(bool),
-            link_offset=offset,
+            link_offset=offsets.get("link_offset"),
+            tip_offset=offsets.get("tip_offset"),
             side=text(path, a, "side"),
             source=text(path, a, "source"),
         ),

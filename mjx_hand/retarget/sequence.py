@@ -49,7 +49,7 @@ def rigid_hand_of(motion: Motion, hand: HandModel, axes: str = "anatomical") -> 
         raise InputError(f"{motion.source or 'motion'}: a {motion.side} hand; load_hand(side={motion.side!r}) fits it")
     if motion.link_offset is None:
         return build_rigid_hand(hand, motion.shape, axes)
-    return with_link_offsets(build_rigid_hand(hand, axes=axes), motion.link_offset, axes)
+    return with_link_offsets(build_rigid_hand(hand, axes=axes), motion.link_offset, axes, motion.tip_offset)
 
 
 def retarget_sequence(motion: Motion, rigid: RigidHand, method: str = "exact") -> JointMotion:

@@ -10,17 +10,24 @@ from mjx_hand.rigid.axes import AXES
 from mjx_hand.rigid.rigid_hand import RigidHand
 
 
-def with_link_offsets(rigid: RigidHand, link_offset: np.ndarray | Array, axes: str = "anatomical") -> RigidHand:
+def with_link_offsets(
+    rigid: RigidHand,
+    link_offset: np.ndarray | Array,
+    axes: str = "anatomical",
+    tip_offset: np.ndarray | Array | None = None,
+) -> RigidHand:
     """`rigid` with these joint centres and the hinge axes that follow from them; for kinematics.
 
-    Finger tips move out or in by as much as the last recorded bone of their finger is longer or shorter. Masses, meshes
-    and collision shapes stay as they are: they belong to the hand's shape, which joint centres alone do not give.
+    Finger tips that are not given move out or in by as much as the last recorded bone of their finger is longer or
+    shorter. Masses, meshes and collision shapes stay as they are: they belong to the hand's shape, which joint centres
+    alone do not give.
 
     Args:
         rigid: the hand to take all else from.
         link_offset: (16, 3), each joint's centre relative to its parent's (m), in hand-frame directions at rest;
             row 0 is zero.
         axes: how the hinge axes are found, a name in `axes.AXES`.
+        tip_offset: (5, 3), the finger tips relative to the last joints' centres (m), in hand-frame directions at rest.
 
     Raises:
         InputError: wrong shape, not finite, a bone of no length, or an unknown axis rule.
@@ -38,11 +45,16 @@ def with_link_offsets(rigid: RigidHand, link_offset: np.ndarray | Array, axes: s
     centres[0] = rigid.wrist_position
     for link, parent in enumerate(PARENTS[1:], start=1):
         centres[link] = centres[parent] + offset[link]
-    tips = list(TIP_LINKS)
-    scale = length[tips] / np.linalg.norm(np.asarray(rigid.link_offset)[tips], axis=1)
+    if tip_offset is None:
+        tips = list(TIP_LINKS)
+        scale = length[tips] / np.linalg.norm(np.asarray(rigid.link_offset)[tips], axis=1)
+        tip_offset = np.asarray(rigid.tip_offset) * scale[:, None]
+    tip_offset = np.asarray(tip_offset, dtype=float)
+    if tip_offset.shape != (len(TIP_LINKS), 3) or not np.isfinite(tip_offset).all():
+        raise InputError(f"tip_offset has shape {tip_offset.shape}; give {len(TIP_LINKS)} x 3 finite numbers (m)")
     return replace(
         rigid,
         link_offset=offset,
         hinge_axis=AXES[axes](centres, rigid.side),
-        tip_offset=np.asarray(rigid.tip_offset) * scale[:, None],
+        tip_offset=tip_offset,
     )

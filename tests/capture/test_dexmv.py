@@ -111,3 +111,25 @@ def test_unsound_files_are_refused(arrays, tmp_path, change, message):
     np.savez(tmp_path / "bad.npz", **(arrays | change))
     with pytest.raises(InputError, match=message):
         load_motion(tmp_path / "bad.npz")
+
+
+def test_the_subjects_finger_tips_are_read(file, arrays):
+    """The tips jitter by 0.2-0.3 mm in their links' frames; one median set must stay near that, and the bones' own."""
+    motion = load_motion(file)
+    assert motion.tip_offset is not None
+    links, places = chain(jnp.asarray(motion.rotations), jnp.asarray(motion.link_offset))
+    last = [3, 6, 9, 12, 15]
+    tips = np.asarray(places)[:, last] + np.einsum("tfij,fj->tfi", np.asarray(links)[:, last], motion.tip_offset)
+    order = [str(name) for name in arrays["joint_order"]]
+    recorded = arrays["joints"][:, [order.index(f"{f}_tip") for f in FINGERS]]
+    off = np.linalg.norm(in_camera(motion, tips) - recorded, axis=-1)
+    assert off.mean() < 1e-3
+
+
+def test_a_recording_without_tips_has_none_and_wrong_names_are_refused(arrays, tmp_path):
+    without = {k: v for k, v in arrays.items() if k not in ("joints", "joint_order")}
+    np.savez(tmp_path / "without.npz", **without)
+    assert load_motion(tmp_path / "without.npz").tip_offset is None
+    np.savez(tmp_path / "wrong.npz", **(arrays | {"joint_order": np.array([f"j{k}" for k in range(21)])}))
+    with pytest.raises(InputError, match="joint_order names j0"):
+        load_motion(tmp_path / "wrong.npz")

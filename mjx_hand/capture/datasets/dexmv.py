@@ -6,20 +6,21 @@ Metres and radians, in the camera's frame (about x right, y down, z forward), on
   ten shape coefficients, and the wrist joint's position.
 - `joint_transforms` (T, 16, 4, 4): each joint's frame in the camera's frame, in the order that
   `joint_transform_order` names.
+- `joints` (T, 21, 3), where present: joints and finger tips in the order that `joint_order` names.
 
 The transforms carry the subject's own joint centres, so no licensed MANO file is needed. Shape and bone lengths were
-estimated frame by frame and jitter; one hand has one of each, so both are medians over the frames.
+estimated frame by frame and jitter; one hand has one of each, so they are medians over the frames.
 """
 
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.spatial.transform import Rotation
 
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
 from mjx_hand.errors import InputError
-from mjx_hand.hand.joints import LINKS, PARENTS
+from mjx_hand.hand.joints import FINGERS, LINKS, PARENTS, TIP_LINKS
 from mjx_hand.motion import Motion, check_motion
 from mjx_hand.motion.layout import numbers
 from mjx_hand.motion.resample import matrix_quaternions
@@ -56,6 +57,29 @@ def ordered_transforms(path: Path, arrays: Contents) -> Float[np.ndarray, "t 16 
     return transforms[:, [names.index(link) for link in LINKS]].astype(float)
 
 
+def tip_offsets(
+    path: Path, arrays: Contents, transforms: Float[np.ndarray, "t 16 4 4"], valid: Bool[np.ndarray, "t"]
+) -> Float[np.ndarray, "5 3"] | None:
+    """The subject's finger tips in the last joints' frames (m), medians over the frames; None where not recorded.
+
+    Raises:
+        InputError: the file has `joints` that are not DexMV's.
+    """
+    if "joints" not in arrays or "joint_order" not in arrays:
+        return None
+    names = [str(name) for name in np.atleast_1d(arrays["joint_order"])]
+    tips = [f"{finger}_tip" for finger in FINGERS]
+    if not set(tips) <= set(names):
+        raise InputError(f"{path}: joint_order names {', '.join(names)}; expected {', '.join(tips)} among them")
+    joints = numbers(path, arrays, {"joints": (len(transforms), len(names), 3)}, finite=False)["joints"]
+    places = joints[:, [names.index(tip) for tip in tips]].astype(float)
+    valid = valid & np.isfinite(places).all(axis=(1, 2))
+    if not valid.any():
+        return None
+    last = transforms[valid][:, list(TIP_LINKS)]
+    return np.median(np.einsum("tfji,tfj->tfi", last[..., :3, :3], places[valid] - last[..., :3, 3]), axis=0)
+
+
 def _read(path: Path, arrays: Contents, request: Request) -> Motion:
     transforms = ordered_transforms(path, arrays)
     frames = len(transforms)
@@ -84,6 +108,7 @@ def _read(path: Path, arrays: Contents, request: Request) -> Motion:
             shape=np.median(mano[valid, 48:58], axis=0),
             valid=valid,
             link_offset=np.median(link_offsets_by_frame(seen), axis=0),
+            tip_offset=tip_offsets(path, arrays, transforms, valid),
             side="right",
             source=f"DexMV {path.name}",
         ),
