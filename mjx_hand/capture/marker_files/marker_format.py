@@ -1,0 +1,32 @@
+"""`MarkerFormat`: what one reader of marker files offers, and the list of all of them."""
+
+import dataclasses
+import importlib
+import pkgutil
+from collections.abc import Callable
+from pathlib import Path
+
+from mjx_hand.capture.recording import MarkerRecording
+
+
+@dataclasses.dataclass(frozen=True)
+class MarkerFormat:
+    """A marker file format. A module of this package that names one `FORMAT` adds it; nothing else needs an edit.
+
+    Attributes:
+        name: one line for people: what the format is called and what marks it.
+        suffixes: of its files, in lower case.
+        read: the recording in a file; the second argument is a unit to read it in instead of the file's own, or None.
+            Raises InputError where the file is not sound.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    read: Callable[[Path, str | None], MarkerRecording]
+
+
+def marker_formats() -> list[MarkerFormat]:
+    """The `FORMAT` of every module in `mjx_hand.capture.marker_files`, in the order of the modules' names."""
+    package = importlib.import_module("mjx_hand.capture.marker_files")
+    modules = [importlib.import_module(f"{package.__name__}.{m.name}") for m in pkgutil.iter_modules(package.__path__)]
+    return [module.FORMAT for module in modules if hasattr(module, "FORMAT")]

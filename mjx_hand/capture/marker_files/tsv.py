@@ -1,0 +1,52 @@
+"""Qualisys Track Manager's TSV export: keys, each with tab-separated values, then a table of millimetres.
+
+The keys `FREQUENCY` and `MARKER_NAMES` are needed. Rows hold X, Y, Z of every marker, with or without frame number
+and time in front (https://docs.qualisys.com/qtm). Gaps are empty, `nan`, or zero, as the export was told. The format
+knows no other unit than the millimetre.
+"""
+
+from pathlib import Path
+
+from mjx_hand.capture.marker_files.marker_format import MarkerFormat
+from mjx_hand.capture.marker_files.samples import recording_of
+from mjx_hand.capture.marker_files.text_table import check_count, numbers_of, positive, read_lines
+from mjx_hand.capture.recording import MarkerRecording
+from mjx_hand.errors import InputError
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def _read(path: Path, units: str | None) -> MarkerRecording:
+    lines = read_lines(path)
+    keys: dict[str, list[str]] = {}
+    start = 0
+    for start, line in enumerate(lines):  # noqa: B007
+        cells = [cell.strip() for cell in line.split("\t")]
+        if _is_number(cells[0]):
+            break
+        keys[cells[0]] = cells[1:]
+    else:
+        start = len(lines)
+    missing = [key for key in ("FREQUENCY", "MARKER_NAMES") if not keys.get(key)]
+    if missing:
+        raise InputError(f"{path}: not a Qualisys TSV (no {' and no '.join(missing)}); export it as TSV with header")
+    names = [name for name in keys["MARKER_NAMES"] if name]
+    promised = positive(path, "NO_OF_MARKERS", keys.get("NO_OF_MARKERS", [str(len(names))])[0])
+    if promised != len(names):
+        raise InputError(f"{path}: {len(names)} marker names for {promised:g} markers; label all trajectories")
+    leading = sum(word.lower() in ("frame", "time") for key in keys for word in [key, *keys[key][:1]])
+    table = numbers_of(path, lines[start:], "\t", leading + 3 * len(names), start + 1)
+    if "NO_OF_FRAMES" in keys:
+        check_count(path, positive(path, "NO_OF_FRAMES", keys["NO_OF_FRAMES"][0]), len(table))
+    positions = table[:, leading:].reshape(len(table), len(names), 3)
+    fps = positive(path, "FREQUENCY", keys["FREQUENCY"][0])
+    return recording_of(path, names, positions, fps, units or "mm")
+
+
+FORMAT = MarkerFormat(name="Qualisys TSV (.tsv)", suffixes=(".tsv",), read=_read)
