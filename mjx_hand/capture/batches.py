@@ -9,8 +9,10 @@ import numpy as np
 from mjx_hand.capture.linearise import PoseState
 from mjx_hand.capture.pose_solver import Frames, PoseEstimate, solve_poses
 from mjx_hand.capture.skinned_points import SkinnedPoints
+from mjx_hand.pytree import replace
 
 CHUNK = 256  # frames a call
+BY_FRAME = ("observed", "weight", "rest", "centres", "mean")  # what of `Frames` has a row a frame
 Array = np.ndarray
 
 
@@ -22,27 +24,15 @@ def padded(frames: Frames, state: PoseState, size: int) -> tuple[Frames, PoseSta
         return np.concatenate([array, np.repeat(array[-1:], size - count, axis=0)])
 
     weight = np.concatenate([frames.weight, np.zeros((size - count, frames.weight.shape[1]), np.float32)])
-    longer = Frames(
-        observed=pad(frames.observed),
-        weight=weight,
-        rest=pad(frames.rest),
-        centres=pad(frames.centres),
-        mean=pad(frames.mean),
-        precision=frames.precision,
+    longer = replace(
+        frames, weight=weight, **{name: pad(getattr(frames, name)) for name in BY_FRAME if name != "weight"}
     )
     return longer, jax.tree.map(pad, state)
 
 
 def part(frames: Frames, state: PoseState, at: slice | Array) -> tuple[Frames, PoseState]:
     """Some of the frames and their poses."""
-    some = Frames(
-        observed=frames.observed[at],
-        weight=frames.weight[at],
-        rest=frames.rest[at],
-        centres=frames.centres[at],
-        mean=frames.mean[at],
-        precision=frames.precision,
-    )
+    some = replace(frames, **{name: getattr(frames, name)[at] for name in BY_FRAME})
     return some, jax.tree.map(lambda array: array[at], state)
 
 

@@ -13,7 +13,7 @@ from mjx_hand.capture.batches import Meter, padded, part, solve_all
 from mjx_hand.capture.fit_report import FitReport, make_report
 from mjx_hand.capture.linearise import PoseState
 from mjx_hand.capture.marker_set import MarkerSet, rest_offsets
-from mjx_hand.capture.pose_prior import pose_prior
+from mjx_hand.capture.pose_prior import joint_precision, pose_prior
 from mjx_hand.capture.recording import MarkerRecording
 from mjx_hand.capture.shape_solver import Subject, solve_subject
 from mjx_hand.capture.skinned_points import skinned_points
@@ -35,6 +35,9 @@ INDEPENDENT = 2.4
 # How far (m) a marker coordinate is from the model while the shape is the mean one. Believed more, markers fold a
 # joint the wrong way to make up for a bone's length.
 MEAN_SHAPE_DEVIATION = 0.005
+# How far (m) from the model a marker counts as wrong: on the mean shape, with the shape, from key frames.
+OUTLIERS = (0.05, 0.02, 0.03)
+KNOWN = 1e-3  # standard deviation of a shape coefficient that is known
 KEYFRAME_STEPS, SUBJECT_STEPS, FRAME_STEPS, SMOOTH_STEPS = 15, 18, 4, 2
 
 
@@ -44,24 +47,31 @@ class FitSettings:
 
     Attributes:
         marker_deviation: standard deviation of a marker coordinate about the model, m: noise and moving skin.
-        offset_deviation: standard deviation of each component of where a marker was stuck on, m.
+        shape: shape coefficients that are known, such as those of an earlier fit of the same person; None to find them.
         min_visible: markers that a frame must show to be valid.
         acceleration: standard deviation of the angular acceleration of a finger joint, rad/s^2.
         smoothing_deviation: how far (rad) a joint is expected to be from the smooth course.
         max_distance: how far (m) a marker may be from the fitted hand (RMS), or be found from where the marker set
             puts it, before the recording is refused.
+        outlier: how far (m) from the fitted hand a marker loses most of its say: swapped for a moment, or a ghost.
     """
 
     marker_deviation: float = 0.001
-    offset_deviation: float = 0.0015
+    shape: tuple[float, ...] | None = None
     min_visible: int = 8
     acceleration: float = 50.0
     smoothing_deviation: float = 0.05
     max_distance: float = 0.010
+    outlier: float = 0.010
 
     def __post_init__(self) -> None:
+        known = self.shape or ()
+        if len(known) > MAX_SHAPE or not np.isfinite(known).all():
+            raise InputError(
+                f"fit setting shape has {len(known)} coefficients, expected up to {MAX_SHAPE} finite numbers"
+            )
         for name, value in vars(self).items():
-            if not (np.isfinite(value) and value > 0):
+            if name != "shape" and not (np.isfinite(value) and value > 0):
                 raise InputError(f"fit setting {name} is {value}, expected a number above 0")
 
 
@@ -108,14 +118,15 @@ def fit_many(
     frame_steps = sum(len(track.frames) for track in tracks) * (FRAME_STEPS + SMOOTH_STEPS)
     meter = Meter(progress, sum(map(len, keys)) * (KEYFRAME_STEPS + SUBJECT_STEPS) + frame_steps)
 
-    mean_subject = Subject(
-        shape=jnp.zeros(points.rest_directions.shape[-1]), offsets=jnp.zeros((len(marker_set.names), 3))
-    )
-    starts = [begin(track, points, mean_subject, palm, prior, MEAN_SHAPE_DEVIATION) for track in tracks]
+    known = np.zeros(points.rest_directions.shape[-1], np.float32)
+    known[: len(settings.shape or ())] = settings.shape or ()
+    expected = Subject(shape=jnp.asarray(known), offsets=jnp.zeros((len(marker_set.names), 3)))
+    starts = [begin(track, points, expected, palm, prior, MEAN_SHAPE_DEVIATION, OUTLIERS[0]) for track in tracks]
     chosen = [part(frames, state, key) for (frames, state), key in zip(starts, keys, strict=True)]
     poses = solve_all(points, *joined(chosen), KEYFRAME_STEPS, meter).state
 
-    deviation = jnp.asarray(settings.offset_deviation)
+    place_deviation = jnp.asarray(marker_set.place_deviation, jnp.float32)
+    shape_deviation = jnp.asarray(1.0 if settings.shape is None else KNOWN)
     subjects, starts = [], []
     bounds = np.cumsum([0, *map(len, keys)])
     for i, (track, key) in enumerate(zip(tracks, keys, strict=True)):
@@ -125,10 +136,13 @@ def fit_many(
             frames,
             weight=frames.weight * (MEAN_SHAPE_DEVIATION / settings.marker_deviation) ** 2,
             precision=frames.precision * min(INDEPENDENT / len(key), 1.0),
+            outlier=np.float32(OUTLIERS[1]),
         )
         some = jax.tree.map(jnp.asarray, padded(weakened, pose, KEYFRAMES))
-        subject, pose = solve_subject(points, *some, mean_subject, deviation, jnp.asarray(SUBJECT_STEPS))
-        frames, state = begin(track, points, subject, palm, prior, settings.marker_deviation)
+        subject, pose = solve_subject(
+            points, *some, expected, shape_deviation, place_deviation, jnp.asarray(SUBJECT_STEPS)
+        )
+        frames, state = begin(track, points, subject, palm, prior, settings.marker_deviation, OUTLIERS[2])
         vectors = between_keyframes(track.frames, key, np.asarray(pose.vectors)[: len(key)])
         subjects.append(subject)
         starts.append((frames, replace(state, vectors=vectors)))
@@ -141,18 +155,17 @@ def fit_many(
     smooth = []
     for at, track in zip(windows, tracks, strict=True):
         jerkiness = settings.acceleration / track.recording.fps**2
-        precision = np.asarray(prior.precision)
+        precision = joint_precision(np.asarray(prior.precision))
         smooth.append(smooth_vectors(found.state.vectors[at], found.covariance[at], precision, track.frames, jerkiness))
     frames = drawn_towards(frames, np.concatenate(smooth), settings.smoothing_deviation)
+    frames = replace(frames, outlier=np.float32(settings.outlier))
     found = solve_all(points, frames, found.state, SMOOTH_STEPS, meter)
 
     out = []
     for at, track, subject in zip(windows, tracks, subjects, strict=True):
         motion = make_motion(track, jax.tree.map(lambda a, at=at: a[at], found.state), subject, hand)
         offsets = np.asarray(subject.offsets)
-        report = make_report(
-            track, found.residual[at], offsets, marker_set.names, FRAME_STEPS + SMOOTH_STEPS, settings.max_distance
-        )
+        report = make_report(track, found.residual[at], offsets, marker_set, settings.outlier, settings.max_distance)
         out.append((motion, report))
     return out
 

@@ -1,5 +1,6 @@
 """Where a marker sits, said anatomically, so that one description fits every hand; and its YAML form."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -22,12 +23,13 @@ DIRECTIONS = {
     "distal": (-1.0, 0.0, 0.0),
     "proximal": (1.0, 0.0, 0.0),
 }
-KEYS = ("joint", "to", "along", "facing", "offset")
+KEYS = ("joint", "to", "along", "facing", "offset", "vertex", "within", "labels")
+WITHIN = 0.0015  # m; how exactly a person sticks a marker on where the set says, unless the set says otherwise
 
 
 @dataclass(frozen=True)
 class MarkerPlace:
-    """A place on the skin: from a point on the bone, straight out in an anatomical direction.
+    """A place on the skin: from a point on the bone, straight out in an anatomical direction; or a vertex.
 
     Attributes:
         name: the marker's label.
@@ -36,6 +38,9 @@ class MarkerPlace:
         along: how far from the one to the other, 0 to 1.
         facing: one or more of `DIRECTIONS`, summed: the way out to the skin.
         offset: distance (m) of the marker's centre from the skin.
+        vertex: the hand's vertex, of one hand model only; it takes the place of the four before it.
+        within: standard deviation (m) of each component of where the marker really is, about this place.
+        labels: regular expressions of other labels that recordings give it.
     """
 
     name: str
@@ -44,6 +49,9 @@ class MarkerPlace:
     along: float
     facing: tuple[str, ...]
     offset: float
+    vertex: int | None = None
+    within: float = WITHIN
+    labels: tuple[str, ...] = ()
 
 
 def next_joint(joint: str) -> str:
@@ -64,6 +72,11 @@ def parse_places(text: str, source: str) -> tuple[MarkerPlace, ...]:
           index_pip: {joint: index2, facing: dorsal}
           hand_back: {joint: wrist, along: 0.5, facing: dorsal}     # towards middle1, unless `to` says otherwise
           thumb_nail: {joint: thumb3, along: 0.7, facing: [dorsal, radial]}
+          index_nail: {vertex: 314}                                 # of one hand model only
+          ring_nail: {joint: ring3, facing: dorsal, within: 0.005, labels: [RNAIL, 'ring.?tip']}
+
+    `within`, which may also be common, says how exactly the place is known. A recording's label belongs to the marker
+    of that name, or to the one that has a regular expression for it in `labels`.
 
     Raises:
         InputError: the text is not YAML or not of this form.
@@ -74,14 +87,14 @@ def parse_places(text: str, source: str) -> tuple[MarkerPlace, ...]:
         raise InputError(f"{source}: not YAML ({' '.join(str(error).split())})") from None
     if not isinstance(document, Mapping) or not isinstance(document.get("markers"), Mapping) or not document["markers"]:
         raise InputError(f"{source}: not a marker set; give a mapping `markers` from names to places")
-    unknown = [str(key) for key in document if key not in ("markers", "offset")]
+    unknown = [str(key) for key in document if key not in ("markers", "offset", "within")]
     if unknown:
-        raise InputError(f"{source}: unknown entry {', '.join(unknown)}; valid are markers, offset")
-    common = document.get("offset")
+        raise InputError(f"{source}: unknown entry {', '.join(unknown)}; valid are markers, offset, within")
+    common = {"offset": document.get("offset"), "within": document.get("within", WITHIN)}
     return tuple(parse_place(str(name), entry, common, source) for name, entry in document["markers"].items())
 
 
-def parse_place(name: str, entry: Any, common_offset: Any, source: str) -> MarkerPlace:
+def parse_place(name: str, entry: Any, common: Mapping[str, Any], source: str) -> MarkerPlace:
     """One marker's entry, checked."""
     where = f"{source}: marker {name!r}"
     if not isinstance(entry, Mapping):
@@ -89,6 +102,16 @@ def parse_place(name: str, entry: Any, common_offset: Any, source: str) -> Marke
     unknown = [str(key) for key in entry if key not in KEYS]
     if unknown:
         raise InputError(f"{where}: unknown entry {', '.join(unknown)}; valid are {', '.join(KEYS)}")
+    offset = number(where, "offset", entry.get("offset", common["offset"]), 0.05)
+    within = number(where, "within", entry.get("within", common["within"]), 0.05)
+    if within == 0:
+        raise InputError(f"{where}: within is 0; give the metres by which its place may be off, such as {WITHIN}")
+    labels = parse_labels(where, entry.get("labels", []))
+    if "vertex" in entry:
+        vertex = entry["vertex"]
+        if isinstance(vertex, bool) or not isinstance(vertex, int) or vertex < 0 or {"joint", "facing"} & set(entry):
+            raise InputError(f"{where}: give either a vertex, a number from 0, or joint and facing")
+        return MarkerPlace(name, "", "", 0.0, (), offset, vertex, within, labels)
     joint = choice(where, "joint", entry.get("joint"), LINKS)
     to = entry.get("to", next_joint(joint))
     to = choice(where, "to", to, (*LINKS, *TIPS))
@@ -98,8 +121,18 @@ def parse_place(name: str, entry: Any, common_offset: Any, source: str) -> Marke
     if not np.any(np.sum([DIRECTIONS[word] for word in directions], axis=0)):
         raise InputError(f"{where}: facing {', '.join(directions)} cancels out; give directions that differ")
     along = number(where, "along", entry.get("along", 0.0), 1.0)
-    offset = number(where, "offset", entry.get("offset", common_offset), 0.05)
-    return MarkerPlace(name=name, joint=joint, to=to, along=along, facing=directions, offset=offset)
+    return MarkerPlace(name, joint, to, along, directions, offset, None, within, labels)
+
+
+def parse_labels(where: str, value: Any) -> tuple[str, ...]:
+    """Regular expressions, checked."""
+    words = value if isinstance(value, list) else [value]
+    for word in words:
+        try:
+            re.compile(word)
+        except (re.error, TypeError):
+            raise InputError(f"{where}: labels has {word!r}, which is not a regular expression; quote it") from None
+    return tuple(words)
 
 
 def choice(where: str, key: str, value: Any, valid: tuple[str, ...]) -> str:
@@ -120,8 +153,15 @@ def skin_vertex(place: MarkerPlace, hand: HandModel) -> int:
     """The vertex nearest to where the ray from the bone, in the direction that the place faces, leaves the skin.
 
     Raises:
-        InputError: the ray meets no skin.
+        InputError: the ray meets no skin, or the hand has no such vertex.
     """
+    if place.vertex is not None:
+        if place.vertex >= hand.num_vertices:
+            raise InputError(
+                f"marker {place.name!r}: vertex {place.vertex}, but {hand.name} has {hand.num_vertices}; "
+                "the set is for another hand model"
+            )
+        return place.vertex
     template = np.asarray(hand.template, np.float64)
     centres = np.asarray(hand.joint_regressor, np.float64) @ template
     tips = template[np.asarray(hand.tip_vertices)]

@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
-from mjx_hand.capture.marker_places import MarkerPlace, parse_places, skin_vertex
+from mjx_hand.capture.marker_files.text_table import read_lines
+from mjx_hand.capture.marker_places import WITHIN, MarkerPlace, parse_places, skin_vertex
 from mjx_hand.errors import InputError
 from mjx_hand.hand.model import HandModel
 
-INCLUDED = "hand22.yaml"  # the set that `included_marker_set` resolves
+INCLUDED = ("hand22", "glove13")  # names of the sets that come with the project: YAML files beside this module
 
 
 @dataclass(frozen=True)
@@ -22,11 +23,20 @@ class MarkerSet:
         names: the markers' labels in recordings.
         vertices: the hand vertex that each marker sits on.
         offsets: distance (m) of the marker's centre from the skin, along the vertex normal.
+        within: standard deviation (m) of each component of where the marker really is; None for `WITHIN` each.
+        labels: of each marker, regular expressions of other labels that recordings give it; empty for none at all.
     """
 
     names: tuple[str, ...]
     vertices: Int[np.ndarray, "m"]
     offsets: Float[np.ndarray, "m"]
+    within: Float[np.ndarray, "m"] | None = None
+    labels: tuple[tuple[str, ...], ...] = ()
+
+    @property
+    def place_deviation(self) -> Float[np.ndarray, "m"]:
+        """`within`, or what it is taken for (m)."""
+        return np.full(len(self.names), WITHIN) if self.within is None else self.within
 
     def __post_init__(self) -> None:
         repeated = sorted({n for n in self.names if self.names.count(n) > 1})
@@ -60,25 +70,33 @@ def place_markers(places: tuple[MarkerPlace, ...], hand: HandModel) -> MarkerSet
         names=tuple(place.name for place in places),
         vertices=np.array(vertices),
         offsets=np.array([place.offset for place in places]),
+        within=np.array([place.within for place in places]),
+        labels=tuple(place.labels for place in places),
     )
 
 
 def load_marker_set(path: str | Path, hand: HandModel) -> MarkerSet:
     """The marker set of a YAML file (form: `marker_places.parse_places`), resolved onto `hand`.
 
+    Args:
+        path: of the file, or the name of an included set.
+        hand: the hand that wears it.
+
     Raises:
         InputError: no such file, not YAML, not a marker set, or it does not fit this hand.
     """
+    if str(path) in INCLUDED:
+        return included_marker_set(hand, str(path))
     path = Path(path)
     if not path.is_file():
-        raise InputError(f"{path}: no such file; give the path of a marker set in YAML")
-    return place_markers(parse_places(path.read_text(encoding="utf-8"), str(path)), hand)
+        raise InputError(f"{path}: no such marker set; give a YAML file, or one of {', '.join(INCLUDED)}")
+    return place_markers(parse_places("\n".join(read_lines(path)), str(path)), hand)
 
 
-def included_marker_set(hand: HandModel) -> MarkerSet:
-    """The included set of 22 markers (as many as in arXiv 2512.07359), resolved onto `hand`."""
-    text = resources.files("mjx_hand.capture").joinpath(INCLUDED).read_text(encoding="utf-8")
-    return place_markers(parse_places(text, INCLUDED), hand)
+def included_marker_set(hand: HandModel, name: str = "hand22") -> MarkerSet:
+    """An included set, resolved onto `hand`: "hand22", of as many markers as arXiv 2512.07359 has, or "glove13"."""
+    text = resources.files("mjx_hand.capture").joinpath(f"{name}.yaml").read_text(encoding="utf-8")
+    return place_markers(parse_places(text, name), hand)
 
 
 def rest_offsets(marker_set: MarkerSet, hand: HandModel) -> Float[np.ndarray, "m 3"]:

@@ -4,45 +4,58 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from mjx_hand.capture.joint_ranges import JointRanges, joint_frames, joint_ranges
 from mjx_hand.hand.joints import FINGERS, NUM_BALL_JOINTS
 from mjx_hand.hand.model import HandModel
 from mjx_hand.pytree import pytree
-from mjx_hand.rigid.axes import anatomical_axes
 
 # Degrees, a joint of a finger, knuckle outwards: mean flexion, then the standard deviations of flexion, abduction
 # and rotation about the bone. Flexion is loose, its range is the joint's own. The other two are the off-axis rotation
 # of real recordings (MCP up to 16, PIP 8, DIP 3) taken as two standard deviations; one marker a joint barely sees them.
 FINGER = ((25.0, 40.0, 12.0, 8.0), (30.0, 40.0, 4.0, 5.0), (20.0, 30.0, 2.0, 2.0))
 THUMB = ((10.0, 25.0, 20.0, 8.0), (15.0, 25.0, 6.0, 6.0), (15.0, 30.0, 3.0, 3.0))
+# A finger's two outer joints bend together, pulled by the same tendons: the DIP joint two thirds of the PIP joint
+# (Rijpkema and Girard 1991, https://doi.org/10.1145/122718.122754), give or take what contact at the tip does.
+DIP_FOR_PIP = 2 / 3
+DIP_DEVIATION = 16.0  # degrees
 
 
 @pytree
 class PosePrior:
-    """A normal distribution of the 15 joints' rotation vectors (rad, hand axes).
+    """A normal distribution of the 15 joints' rotation vectors (rad, hand axes), and the ranges that they stay in.
 
     Attributes:
         mean: its mean.
-        precision: its inverse covariance, joint by joint.
+        precision: its inverse covariance, finger by finger.
+        ranges: the joints' ranges of motion.
     """
 
     mean: Float[Array, "15 3"]
-    precision: Float[Array, "15 3 3"]
+    precision: Float[Array, "5 9 9"]
+    ranges: JointRanges
 
 
 def pose_prior(hand: HandModel) -> PosePrior:
     """The prior for this hand, along the anatomical axes of its mean shape."""
-    centres = np.asarray(hand.joint_regressor, np.float64) @ hand.template
-    axes = anatomical_axes(centres, hand.side).reshape(5, 4, 3)  # abduction, flexion, then two hinges
+    frames = joint_frames(hand)
     mean = np.zeros((NUM_BALL_JOINTS, 3))
-    precision = np.zeros((NUM_BALL_JOINTS, 3, 3))
+    precision = np.zeros((len(FINGERS), 9, 9))
     for f, finger in enumerate(FINGERS):
-        abduction = axes[f, 0]
         for k, (flexed, *sigma) in enumerate(np.deg2rad(THUMB if finger == "thumb" else FINGER)):
-            flexion = axes[f, k + 1]
-            # At right angles to flexion: a thumb's hinges are turned away from its base joint's axes.
-            sideways = abduction - (abduction @ flexion) * flexion
-            sideways /= np.linalg.norm(sideways)
-            frame = np.stack([flexion, sideways, np.cross(flexion, sideways)], axis=1)
-            mean[3 * f + k] = flexed * flexion
-            precision[3 * f + k] = frame @ np.diag(1 / np.square(sigma)) @ frame.T
-    return PosePrior(mean=jnp.asarray(mean, jnp.float32), precision=jnp.asarray(precision, jnp.float32))
+            axes = frames[3 * f + k]
+            mean[3 * f + k] = flexed * axes[0]
+            own = slice(3 * k, 3 * k + 3)
+            precision[f, own, own] += axes.T @ np.diag(1 / np.square(sigma)) @ axes
+        if finger != "thumb":
+            # The means of FINGER are in the same proportion, so that this term is zero there and moves none of them.
+            together = np.concatenate([np.zeros(3), -DIP_FOR_PIP * frames[3 * f + 1, 0], frames[3 * f + 2, 0]])
+            precision[f] += np.outer(together, together) / np.deg2rad(DIP_DEVIATION) ** 2
+    return PosePrior(
+        mean=jnp.asarray(mean, jnp.float32), precision=jnp.asarray(precision, jnp.float32), ranges=joint_ranges(hand)
+    )
+
+
+def joint_precision(precision: Float[np.ndarray, "5 9 9"]) -> Float[np.ndarray, "15 3 3"]:
+    """The part of a prior's precision that speaks of each joint alone."""
+    blocks = precision.reshape(5, 3, 3, 3, 3)
+    return np.einsum("fjajc->fjac", blocks).reshape(NUM_BALL_JOINTS, 3, 3)

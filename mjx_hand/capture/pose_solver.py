@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from mjx_hand.capture.joint_ranges import GIVE, JointRanges, beyond
 from mjx_hand.capture.linearise import NUM_POSE, PoseState, pose_jacobian, residuals, step_state
 from mjx_hand.capture.normal_blocks import NormalBlocks, damped, joint_covariance, normal_blocks, solve_blocks
 from mjx_hand.capture.skinned_points import SkinnedPoints
@@ -27,6 +28,8 @@ class Frames:
         rest: each frame's own rest markers (its subject's shape and skin offsets).
         centres: its subject's joint centres.
         mean, precision: normal prior of the rotation vectors.
+        ranges: ranges of the joints' motion.
+        outlier: how far (m) from the model a marker loses most of its say: a wrong one then cannot drag the hand.
     """
 
     observed: Float[Any, "b m 3"]
@@ -34,14 +37,31 @@ class Frames:
     rest: Float[Any, "b m 3"]
     centres: Float[Any, "b 16 3"]
     mean: Float[Any, "b 15 3"]
-    precision: Float[Any, "15 3 3"]
+    precision: Float[Any, "5 9 9"]
+    ranges: JointRanges
+    outlier: Float[Any, ""]
+
+
+def trust(frames: Frames, residual: Float[Array, "b m 3"]) -> Float[Array, "b m"]:
+    """The share of its say that each marker keeps: 1 at the model, a quarter at `outlier`, falling to nothing.
+
+    The weights of Geman and McClure's estimator (1987), whose loss is the squared distance times this one's root.
+    """
+    return jnp.square(frames.outlier**2 / (frames.outlier**2 + jnp.sum(residual**2, axis=-1)))
+
+
+def fingers_of(values: Float[Array, "b 15 3"]) -> Float[Array, "b 5 9"]:
+    """Rotation vectors finger by finger, as a prior's precision has them."""
+    return values.reshape(-1, 5, 9)
 
 
 def energy(frames: Frames, residual: Float[Array, "b m 3"], state: PoseState) -> Float[Array, "b"]:
     """Twice the negative log posterior of each frame, up to a constant."""
-    off = state.vectors - frames.mean
-    prior = jnp.einsum("bja,jac,bjc->b", off, frames.precision, off)
-    return jnp.einsum("bm,bma->b", frames.weight, residual**2) + prior
+    off = fingers_of(state.vectors - frames.mean)
+    prior = jnp.einsum("bfp,fpq,bfq->b", off, frames.precision, off)
+    limits = jnp.sum(jnp.square(beyond(frames.ranges, state.vectors) / GIVE), axis=(1, 2))
+    loss = jnp.sqrt(trust(frames, residual)) * jnp.sum(residual**2, axis=-1)
+    return jnp.sum(frames.weight * loss, axis=-1) + prior + limits
 
 
 def normal_equations(
@@ -53,15 +73,20 @@ def normal_equations(
     steers the step, takes each marker for its main finger's, so that fingers do not couple.
     """
     residual, jacobian = pose_jacobian(points, frames.rest, frames.centres, state, frames.observed)
-    pull = jnp.einsum("jac,bjc->bja", frames.precision, state.vectors - frames.mean).reshape(-1, 45)
-    gradient = jnp.einsum("bmap,bma->bp", jacobian, frames.weight[..., None] * residual).at[:, 6:].add(pull)
+    weight = frames.weight * trust(frames, residual)
+    pull = jnp.einsum("fpq,bfq->bfp", frames.precision, fingers_of(state.vectors - frames.mean)).reshape(-1, 45)
+    over = beyond(frames.ranges, state.vectors) / GIVE**2
+    back = jnp.einsum("jka,bjk->bja", frames.ranges.axes, over).reshape(-1, 45)
+    gradient = jnp.einsum("bmap,bma->bp", jacobian, weight[..., None] * residual).at[:, 6:].add(pull + back)
     finger_weight = points.weights[:, 1:].reshape(-1, 5, 3).sum(axis=-1)
     main = jax.nn.one_hot(jnp.argmax(finger_weight, axis=-1), 5)
     own = jnp.concatenate([jnp.ones((main.shape[0], 6)), jnp.repeat(main, 9, axis=1)], axis=1)
     steering = jacobian * own[:, None]
-    rows = jnp.sqrt(frames.weight)[..., None, None] * steering
+    rows = jnp.sqrt(weight)[..., None, None] * steering
     blocks = normal_blocks(rows.reshape(rows.shape[0], -1, NUM_POSE))
-    prior = jax.vmap(lambda finger: jax.scipy.linalg.block_diag(*finger))(frames.precision.reshape(5, 3, 3, 3))
+    stiff = jnp.einsum("jka,bjk,jkc->bjac", frames.ranges.axes, (over != 0) / GIVE**2, frames.ranges.axes)
+    limits = jnp.einsum("bfjac,jk->bfjakc", stiff.reshape(-1, 5, 3, 3, 3), jnp.eye(3)).reshape(-1, 5, 9, 9)
+    prior = frames.precision + limits
     return replace(blocks, fingers=blocks.fingers + prior), gradient, energy(frames, residual, state), steering
 
 

@@ -10,7 +10,16 @@ from jaxtyping import Array, Float, Int
 
 from mjx_hand.capture.linearise import PoseState, residuals, step_state
 from mjx_hand.capture.normal_blocks import NormalBlocks, damped, solve_blocks
-from mjx_hand.capture.pose_solver import ACCEPTED, FLOOR, INITIAL_DAMPING, REJECTED, Frames, energy, normal_equations
+from mjx_hand.capture.pose_solver import (
+    ACCEPTED,
+    FLOOR,
+    INITIAL_DAMPING,
+    REJECTED,
+    Frames,
+    energy,
+    normal_equations,
+    trust,
+)
 from mjx_hand.capture.skinned_points import SkinnedPoints, blend_points, shape_points
 from mjx_hand.hand.skinning import link_transforms
 from mjx_hand.pytree import pytree, replace
@@ -76,20 +85,25 @@ class JointSystem:
 
 
 def joint_system(
-    points: SkinnedPoints, frames: Frames, state: PoseState, subject: Subject, prior: Float[Array, "q"]
+    points: SkinnedPoints,
+    frames: Frames,
+    state: PoseState,
+    subject: Subject,
+    expected: Float[Array, "q"],
+    prior: Float[Array, "q"],
 ) -> JointSystem:
-    """Linearise about poses and subject; `prior` is the precision of shape and offsets."""
+    """Linearise about poses and subject; `prior` is the precision of shape and offsets about what is expected."""
     here = with_subject(points, frames, subject)
     normal, gradient, _, by_pose = normal_equations(points, here, state)
     by_subject = subject_jacobian(points, here, state.vectors)
     residual = residuals(points, here.rest, here.centres, state, here.observed)
-    weighted = here.weight[..., None, None] * by_subject
+    weighted = (here.weight * trust(here, residual))[..., None, None] * by_subject
     return JointSystem(
         poses=normal,
         pose_gradient=gradient,
         cross=jnp.einsum("bmap,bmaq->bpq", by_pose, weighted),
         shared=jnp.einsum("bmap,bmaq->pq", by_subject, weighted) + jnp.diag(prior),
-        shared_gradient=jnp.einsum("bmaq,bma->q", weighted, residual) + prior * flat(subject),
+        shared_gradient=jnp.einsum("bmaq,bma->q", weighted, residual) + prior * (flat(subject) - expected),
     )
 
 
@@ -116,7 +130,8 @@ def solve_subject(
     frames: Frames,
     state: PoseState,
     subject: Subject,
-    offset_deviation: Float[Array, ""],
+    shape_deviation: Float[Array, ""],
+    offset_deviation: Float[Array, "m"],
     iterations: Int[Array, ""],
 ) -> tuple[Subject, PoseState]:
     """Shape, offsets and the poses of `frames`, all of one recording, after a fixed number of damped steps.
@@ -125,21 +140,23 @@ def solve_subject(
         points: markers where the marker set puts them.
         frames: the chosen frames; their `rest` and `centres` are ignored.
         state: where to start.
-        subject: where to start.
-        offset_deviation: standard deviation of each component of an offset, m.
+        subject: where to start, and what is expected.
+        shape_deviation: standard deviation of each shape coefficient about it; 1 is the model's own.
+        offset_deviation: standard deviation of each component of a marker's offset, m.
         iterations: number of steps.
     """
     num_shape = subject.shape.shape[0]
-    prior = jnp.concatenate([jnp.ones(num_shape), jnp.full(subject.offsets.size, offset_deviation**-2)])
+    prior = jnp.concatenate([jnp.full(num_shape, shape_deviation**-2), jnp.repeat(offset_deviation**-2, 3)])
+    expected = flat(subject)
 
     def total(state: PoseState, subject: Subject) -> Float[Array, ""]:
         here = with_subject(points, frames, subject)
         residual = residuals(points, here.rest, here.centres, state, here.observed)
-        return energy(here, residual, state).sum() + jnp.sum(prior * flat(subject) ** 2)
+        return energy(here, residual, state).sum() + jnp.sum(prior * (flat(subject) - expected) ** 2)
 
     def iterate(_: Array, carry: tuple[Subject, PoseState, Array]) -> tuple[Subject, PoseState, Array]:
         subject, state, damping = carry
-        pose_step, shared_step = joint_step(joint_system(points, frames, state, subject, prior), damping)
+        pose_step, shared_step = joint_step(joint_system(points, frames, state, subject, expected, prior), damping)
         moved = Subject(
             shape=subject.shape + shared_step[:num_shape],
             offsets=subject.offsets + shared_step[num_shape:].reshape(-1, 3),

@@ -6,6 +6,7 @@ import jax
 import numpy as np
 from jaxtyping import Float, Int
 
+from mjx_hand.capture.batches import BY_FRAME
 from mjx_hand.capture.linearise import PoseState
 from mjx_hand.capture.pose_prior import PosePrior
 from mjx_hand.capture.pose_solver import Frames
@@ -25,6 +26,7 @@ def begin(
     palm: Float[Array, "m"],
     prior: PosePrior,
     marker_deviation: float,
+    outlier: float,
 ) -> tuple[Frames, PoseState]:
     """A track's frames for the solver, and a first guess: fingers at the prior's mean, the wrist from the palm."""
     rest, centres = (np.asarray(array) for array in subject_points(points, subject))
@@ -38,6 +40,8 @@ def begin(
         centres=np.broadcast_to(centres, (count, *centres.shape)),
         mean=mean,
         precision=np.asarray(prior.precision),
+        ranges=prior.ranges,
+        outlier=np.float32(outlier),
     )
     state = PoseState(
         vectors=mean,
@@ -65,10 +69,10 @@ def between_keyframes(
 
 def drawn_towards(frames: Frames, vectors: Float[Array, "b 15 3"], deviation: float) -> Frames:
     """The frames with a prior that is the present one times a normal one about `vectors` (rad)."""
-    pull = np.eye(3) / deviation**2
+    pull = np.eye(9) / deviation**2
     precision = frames.precision + pull
-    weighted = np.einsum("jac,bjc->bja", frames.precision, frames.mean) + vectors / deviation**2
-    mean = np.einsum("jac,bjc->bja", np.linalg.inv(precision), weighted)
+    off = (vectors - frames.mean).reshape(-1, 5, 9) / deviation**2
+    mean = frames.mean + np.einsum("fpq,bfq->bfp", np.linalg.inv(precision), off).reshape(vectors.shape)
     return replace(frames, mean=mean.astype(np.float32), precision=precision.astype(np.float32))
 
 
@@ -79,12 +83,5 @@ def joined(pieces: list[tuple[Frames, PoseState]]) -> tuple[Frames, PoseState]:
     def row(name: str) -> Array:
         return np.concatenate([getattr(f, name) for f in frames])
 
-    together = Frames(
-        observed=row("observed"),
-        weight=row("weight"),
-        rest=row("rest"),
-        centres=row("centres"),
-        mean=row("mean"),
-        precision=frames[0].precision,
-    )
+    together = replace(frames[0], **{name: row(name) for name in BY_FRAME})
     return together, jax.tree.map(lambda *arrays: np.concatenate(arrays), *[piece[1] for piece in pieces])

@@ -83,7 +83,7 @@ def test_marker_set_file(tmp_path, hand):
     path = tmp_path / "set.yaml"
     path.write_text("offset: 0.01\nmarkers:\n  back: {joint: wrist, along: 0.5, facing: dorsal}\n")
     assert load_marker_set(path, hand).names == ("back",)
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match="no such marker set; give a YAML file, or one of hand22, glove13"):
         load_marker_set(tmp_path / "none.yaml", hand)
 
 
