@@ -38,8 +38,8 @@ class KeypointSettings:
         cutoff: of the low-pass filter before the fit, Hz; None leaves the recording's noise in.
         longest_gap: gaps of a keypoint up to this long (s) are bridged by straight lines; longer ones make their
             frames invalid.
-        own_bones: give the motion the subject's own joint centres beside the shape. Positions are nearer to the
-            recording's then, but meshes and masses stay the mean hand's.
+        own_bones: give the motion the subject's own joint centres and finger tips beside the shape. Positions are
+            nearer to the recording's then, but meshes and masses stay the mean hand's.
     """
 
     cutoff: float | None = None
@@ -88,9 +88,8 @@ def fit_keypoints(
     turns, places, valid = _wrist(name, seen, rest)
     if settings.own_bones:
         bases = _finger_bases(recording.positions[valid], turns[valid], rest)
-        rest = own_skeleton(
-            skeleton(hand, np.zeros(1)), hand.side, observed[:NUM_FINGER_BONES].reshape(5, 3)[:, :2], bases
-        )
+        bones = observed[:NUM_FINGER_BONES].reshape(5, 3)
+        rest = own_skeleton(skeleton(hand, np.zeros(1)), hand.side, bones, bases)
         turns, places, valid = _wrist(name, seen, rest)
     rotations = np.tile(np.eye(3), (len(seen), 15, 1, 1))
     rotations[valid] = joint_rotations_along(bone_directions(seen[valid]), turns[valid], rest)
@@ -102,6 +101,7 @@ def fit_keypoints(
         shape=shape,
         valid=valid,
         link_offset=rest.link_offset if settings.own_bones else None,
+        tip_offset=rest.tip_offset if settings.own_bones else None,
         side=hand.side,
         source=f"{hand.name} fitted to {recording.source or 'keypoints'}",
     )

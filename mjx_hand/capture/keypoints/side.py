@@ -33,6 +33,14 @@ def bend_towards_right(positions: Float[np.ndarray, "t 21 3"]) -> float:
         return float(np.nanmean(np.arctan2(sine, cosine)))
 
 
+def bent_side(positions: Float[np.ndarray, "t 21 3"]) -> str:
+    """The side as the fingers bend: "right", "left", or "" where the hand is held too flat to tell."""
+    bend = bend_towards_right(positions)
+    if not abs(bend) >= LEAST_BEND:
+        return ""
+    return "right" if bend > 0 else "left"
+
+
 def known_side(recording: KeypointRecording, asked: str | None = None) -> tuple[str, str]:
     """The hand's side, and how it is known (for people): as asked, as recorded, or as its fingers bend.
 
@@ -41,10 +49,10 @@ def known_side(recording: KeypointRecording, asked: str | None = None) -> tuple[
             says and the hand is held too flat to tell.
     """
     name = recording.source or "keypoints"
-    bend = bend_towards_right(recording.positions)
-    seen = "" if not abs(bend) >= LEAST_BEND else "right" if bend > 0 else "left"
+    seen = bent_side(recording.positions)
     said = asked or recording.side
     if said and seen and said != seen:
+        bend = bend_towards_right(recording.positions)
         raise InputError(
             f"{name}: said to be a {said} hand, but its fingers bend as a {seen} hand's ({np.rad2deg(abs(bend)):.0f} "
             f"degrees on average); give side={seen!r}, or negate one axis if the frame is left-handed (Unity)"

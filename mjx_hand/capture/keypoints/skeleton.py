@@ -37,6 +37,11 @@ class Skeleton:
         joints = self.keypoints[list(LINK_KEYPOINTS)]
         return joints - joints[[0, *PARENTS[1:]]]
 
+    @property
+    def tip_offset(self) -> Float[np.ndarray, "5 3"]:
+        """Each finger tip relative to its last joint's centre."""
+        return self.keypoints[BONES[:, 2, 1]] - self.keypoints[BONES[:, 2, 0]]
+
 
 def rest_keypoints(hand: HandModel) -> tuple[Float[np.ndarray, "21 3"], Float[np.ndarray, "21 3 s"]]:
     """The keypoints (m, hand frame) of the mean shape, and their displacement per unit of each shape coefficient."""
@@ -57,26 +62,20 @@ def skeleton(hand: HandModel, shape: Float[np.ndarray, "s"]) -> Skeleton:
 
 
 def own_skeleton(
-    mean: Skeleton, side: str, lengths: Float[np.ndarray, "5 2"], bases: Float[np.ndarray, "5 3"]
+    mean: Skeleton, side: str, lengths: Float[np.ndarray, "5 3"], bases: Float[np.ndarray, "5 3"]
 ) -> Skeleton:
-    """`mean` with a person's own bones, as `rigid.bone_lengths` makes a hand of them.
+    """`mean` with a person's own bones, in the directions of the mean's.
 
     Args:
         mean: the mean shape's skeleton.
         side: "right" or "left".
-        lengths: of the first two bones of each finger, m.
+        lengths: of the three bones of each finger, m.
         bases: where each finger begins, relative to the wrist joint in hand axes, m.
     """
     keypoints = mean.keypoints.copy()
-    for f, bones in enumerate(BONES):
-        keypoints[bones[0, 0]] = bases[f]
-        for k in range(3):
-            start, end = bones[k]
-            rest = np.linalg.norm(mean.keypoints[end] - mean.keypoints[start])
-            # The finger tip moves out or in as the last bone before it is longer or shorter.
-            last = mean.keypoints[bones[1, 1]] - mean.keypoints[bones[1, 0]]
-            length = lengths[f, k] if k < 2 else rest * lengths[f, 1] / np.linalg.norm(last)
-            keypoints[end] = keypoints[start] + length * mean.directions[f, k]
+    keypoints[BONES[:, 0, 0]] = bases
+    for k in range(3):
+        keypoints[BONES[:, k, 1]] = keypoints[BONES[:, k, 0]] + lengths[:, k, None] * mean.directions[:, k]
     return _skeleton(keypoints, side)
 
 

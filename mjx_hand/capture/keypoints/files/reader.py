@@ -1,0 +1,35 @@
+"""`KeypointReader`: what one form of keypoint file offers, and the list of all of them."""
+
+import dataclasses
+import importlib
+import pkgutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from mjx_hand.capture.keypoints.recording import KeypointRecording
+
+
+@dataclasses.dataclass(frozen=True)
+class KeypointReader:
+    """A form of keypoint file. A module of this package that names one `READER` adds it; nothing else needs an edit.
+
+    Attributes:
+        name: one line for people: what the form is called and what marks it.
+        suffix: of its files.
+        recognises: whether contents are of this form: an `.npz`'s arrays, a `.json`'s value, a `.csv`'s lines.
+        read: from path, contents and the unit that the caller says (or None) to a recording for each hand in it, by
+            the hand's name in the file; raises InputError where the file is of the form but not sound.
+    """
+
+    name: str
+    suffix: str
+    recognises: Callable[[Any], bool]
+    read: Callable[[Path, Any, str | None], dict[str, KeypointRecording]]
+
+
+def keypoint_readers() -> list[KeypointReader]:
+    """The `READER` of every module in `mjx_hand.capture.keypoints.files`, in the order of the modules' names."""
+    package = importlib.import_module("mjx_hand.capture.keypoints.files")
+    modules = [importlib.import_module(f"{package.__name__}.{m.name}") for m in pkgutil.iter_modules(package.__path__)]
+    return [module.READER for module in modules if hasattr(module, "READER")]
