@@ -21,7 +21,7 @@ Array = np.ndarray
 BLUE, ORANGE, GREEN, VIOLET = "#3b82f6", "#f08c2e", "#17a07a", "#9a6bf0"  # legible on white and on near-black
 COLOURS = (BLUE, ORANGE, GREEN, VIOLET)
 _INK = "#5a6372"  # inline_svg() turns it into the page's own text colour
-_STYLE: dict[Any, Any] = {
+STYLE: dict[Any, Any] = {
     "font.size": 10,
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
@@ -43,7 +43,7 @@ _STYLE: dict[Any, Any] = {
 }
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def learning_curve(
     steps: Float[Array, "_"],
     values: Float[Array, "*s k"],
@@ -87,7 +87,7 @@ def learning_curve(
     return figure
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def error_over_time(
     fps: float,
     errors: Mapping[str, tuple[Float[Array, "n t"], Bool[Array, "n t"]]],
@@ -127,7 +127,7 @@ def error_over_time(
     return figure
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def joint_errors(
     joints: Sequence[str],
     errors: Mapping[str, Float[Array, "t j"]],
@@ -165,7 +165,7 @@ def joint_errors(
     return figure
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def retarget_errors(errors: Mapping[str, Float[Array, "_"]], *, label: str = "error (mm)") -> Figure:
     """Boxes (quartiles, whiskers at the 5th and 95th percentile) of each stage's or part's errors.
 
@@ -202,7 +202,7 @@ def retarget_errors(errors: Mapping[str, Float[Array, "_"]], *, label: str = "er
     return figure
 
 
-@mpl.rc_context(_STYLE)
+@mpl.rc_context(STYLE)
 def throughput(rates: Mapping[str, Float[Array, "k 4"]], *, label: str) -> Figure:
     """How fast each contestant is over its number of worlds, on logarithmic axes.
 
@@ -242,14 +242,14 @@ def save_figure(figure: Figure, path: str | Path) -> None:
     suffix = Path(path).suffix
     if suffix not in (".png", ".svg", ".pdf"):
         raise InputError(f"{path}: figures are written as .png, .svg or .pdf")
-    with replacing(path) as temporary, mpl.rc_context(_STYLE):
+    with replacing(path) as temporary, mpl.rc_context(STYLE):
         figure.savefig(temporary, dpi=150, facecolor="white" if suffix == ".png" else "none")
 
 
 def inline_svg(figure: Figure, name: str) -> str:
     """The figure as an SVG element for an HTML page, the same every time; `name` keeps its ids apart from others'."""
     buffer = io.StringIO()
-    with mpl.rc_context({**_STYLE, "svg.fonttype": "none", "svg.hashsalt": name}):
+    with mpl.rc_context({**STYLE, "svg.fonttype": "none", "svg.hashsalt": name}):
         figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
     text = buffer.getvalue()
     element = text[text.index("<svg") :]
