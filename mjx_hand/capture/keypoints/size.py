@@ -36,7 +36,7 @@ def check_size(name: str, hand: HandModel, observed: Float[np.ndarray, "n"]) -> 
     for unit, metres in UNITS.items():
         if unit != "m" and 1 / BIGGEST < ratio * metres < BIGGEST:
             raise InputError(
-                f"{name}: a hand about {1 / metres:.0f} times too big, so its positions are in {unit}; say unit={unit!r}"
+                f"{name}: a hand about {1 / metres:.0f} times too big, so positions are in {unit}; say unit={unit!r}"
             )
     what = f"{ratio:.3g} times too big" if ratio > 1 else f"{1 / ratio:.3g} times too small"
     raise InputError(
