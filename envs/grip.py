@@ -7,6 +7,7 @@ for some time; the policy's residual does the rest.
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from envs.signed_distance import signed_distance
@@ -16,7 +17,7 @@ from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics
 
 _NEAR = 0.007  # m: a finger whose skin is closer than this is taken to touch
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
-_ALONG = jnp.linspace(0.0, 1.0, 5)
+_ALONG = np.linspace(0.0, 1.0, 5)
 
 
 def grip_offsets(

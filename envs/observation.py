@@ -5,6 +5,7 @@ makes PPO diverge.
 """
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, Int
 
 from envs.physics.engine import PhysicsState
@@ -16,8 +17,8 @@ from mjx_hand.rotations import axis_angle_matrix, quaternion_difference, quatern
 
 _NUM_TARGETS = NUM_WRIST + NUM_HINGES
 # One over what each target usually varies by: wrist slides 2 cm, wrist turns and hinges 0.2 rad.
-_TARGET_SCALE = jnp.concatenate([jnp.full(3, 50.0), jnp.full(3, 5.0), jnp.full(NUM_HINGES, 5.0)])
-_SPEED_SCALE = jnp.concatenate([jnp.full(3, 5.0), jnp.full(3, 0.5), jnp.full(NUM_HINGES, 0.2)])
+_TARGET_SCALE = np.concatenate([np.full(3, 50.0), np.full(3, 5.0), np.full(NUM_HINGES, 5.0)])
+_SPEED_SCALE = np.concatenate([np.full(3, 5.0), np.full(3, 0.5), np.full(NUM_HINGES, 0.2)])
 _LENGTH_SCALE = 30.0  # 1/m for errors of the object, 3 cm
 _LIMIT = 5.0
 

@@ -19,7 +19,7 @@ from mjx_hand.rotations import exp
 
 _STEPS = 60
 _BATCH = 16  # hands a compiled call, so that any number of hands compiles once
-_ALONG = jnp.linspace(0.0, 1.0, 4)  # where along each capsule's axis distances are taken
+_ALONG = np.linspace(0.0, 1.0, 4)  # where along each capsule's axis distances are taken
 _OPENING_DAMPING = 0.01  # m/rad
 # What one unit of residual is worth (m, rad).
 _TOUCH, _SLIDE, _CLEAR, _SWAY, _TILT, _PLACE = 0.0005, 0.004, 0.001, 0.5, 0.3, 0.01
