@@ -83,6 +83,24 @@ def select_markers(recording: MarkerRecording, names: Sequence[str]) -> MarkerRe
     )
 
 
+def hide_marker(recording: MarkerRecording, name: str) -> MarkerRecording:
+    """The recording as if this marker had never been seen.
+
+    Raises:
+        InputError: the recording lacks it.
+    """
+    if name not in recording.names:
+        raise InputError(
+            f"{recording.source or 'recording'}: no marker {name!r} to leave out; it has {', '.join(recording.names)}"
+        )
+    hidden = np.array(recording.names) == name
+    return replace(
+        recording,
+        positions=np.where(hidden[:, None], 0.0, recording.positions),
+        visible=recording.visible & ~hidden,
+    )
+
+
 def save_recording(recording: MarkerRecording, path: str | Path) -> None:
     """Write as `.npz` (schema mjx-hand/markers/1; the attributes' names and units)."""
     arrays = {

@@ -14,6 +14,8 @@ from mjx_hand.motion.resample import matrix_quaternions, quaternion_matrices
 
 PALM = 0.25  # least weight of the wrist's link at a marker that tells where the wrist is
 MIN_PALM = 3
+# A hand is never this many times as large or as small as the mean one; a wrong unit is off by ten or more.
+TOO_BIG = 3.0
 
 Array = np.ndarray
 
@@ -79,14 +81,39 @@ def palm_weights(wrist_weight: Float[Array, "m"]) -> Float[Array, "m"]:
     return weights
 
 
+def check_scale(track: Track, rest: Float[Array, "m 3"], palm: Float[Array, "m"]) -> None:
+    """Refuse a recording in another unit than it says.
+
+    Raises:
+        InputError: the palm's markers are many times further apart, or closer together, than on the hand.
+    """
+    weight = palm * track.visible
+    total = np.maximum(weight.sum(axis=1), 1e-12)[:, None]
+    size = []
+    for points in (track.observed, np.broadcast_to(rest, track.observed.shape)):
+        off = points - (np.einsum("tm,tmc->tc", weight, points) / total)[:, None]
+        size.append(np.einsum("tm,tmc->t", weight, off**2))
+    known = ((weight > 0).sum(axis=1) >= MIN_PALM) & (size[1] > 0)
+    if not known.any():
+        return
+    ratio = float(np.sqrt(np.median(size[0][known] / size[1][known])))
+    if not 1 / TOO_BIG < ratio < TOO_BIG:
+        times = f"{ratio:.2g} times too big" if ratio > 1 else f"{1 / max(ratio, 1e-9):.2g} times too small"
+        hint = (
+            "millimetres were taken for metres: read it with --units mm" if ratio > 300 else "check its unit: --units"
+        )
+        raise InputError(f"{track.recording.source or 'recording'}: the hand is {times}; {hint}")
+
+
 def wrist_guess(
     track: Track, rest: Float[Array, "m 3"], palm: Float[Array, "m"]
 ) -> tuple[Float[Array, "b 3 3"], Float[Array, "b 3"]]:
     """Wrist rotation and position (m, less `shift`) from the palm's markers at rest relative to the wrist joint.
 
     Raises:
-        InputError: no frame's markers determine it.
+        InputError: no frame's markers determine it, or they are those of a hand many times too big or small.
     """
+    check_scale(track, rest, palm)
     rotation, position, known = rigid_fit(rest, track.observed, palm * track.visible)
     if not known.any():
         name = track.recording.source or "recording"

@@ -6,12 +6,13 @@ from collections.abc import Sequence
 import tyro
 
 from mjx_hand.cli.build import build
+from mjx_hand.cli.fit import fit
 from mjx_hand.cli.keypoints import keypoints
 from mjx_hand.cli.retarget import retarget
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 
-COMMANDS = {"build": build, "keypoints": keypoints, "retarget": retarget}
+COMMANDS = {"build": build, "fit": fit, "keypoints": keypoints, "retarget": retarget}
 
 
 def main(argv: Sequence[str] | None = None) -> int:

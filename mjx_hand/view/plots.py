@@ -233,15 +233,24 @@ def throughput(rates: Mapping[str, Float[Array, "k 4"]], *, label: str) -> Figur
     return figure
 
 
+def check_figure_path(path: str | Path) -> None:
+    """Refuse a path that `save_figure` cannot write, before the work that leads there.
+
+    Raises:
+        InputError: its suffix is another than .png, .svg or .pdf.
+    """
+    if Path(path).suffix not in (".png", ".svg", ".pdf"):
+        raise InputError(f"{path}: figures are written as .png, .svg or .pdf")
+
+
 def save_figure(figure: Figure, path: str | Path) -> None:
     """Write as the suffix says (PNG on white at 150 dpi; SVG or PDF transparent); whole or not at all.
 
     Raises:
         InputError: another suffix, or a folder that cannot be written.
     """
+    check_figure_path(path)
     suffix = Path(path).suffix
-    if suffix not in (".png", ".svg", ".pdf"):
-        raise InputError(f"{path}: figures are written as .png, .svg or .pdf")
     with replacing(path) as temporary, mpl.rc_context(STYLE):
         figure.savefig(temporary, dpi=150, facecolor="white" if suffix == ".png" else "none")
 
