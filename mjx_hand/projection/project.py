@@ -45,7 +45,7 @@ def project(
 
     Args:
         rotations: the pose, (..., 15, 3, 3): each joint's rotation relative to its parent, in MANO's order.
-        rigid: the hand whose `hinge_axis` (and limits) are used.
+        rigid: the hand whose `hinge_axis` and `rest_rotation` (and limits) are used.
         method: "exact", the least-squares solution in closed form; the others are for comparison: "paper",
             arXiv 2512.07359 as printed; "bch2", its iteration one order further; "naive", the logarithm's components.
         carry: give each joint's residual rotation to its child before projecting that.
@@ -62,13 +62,15 @@ def project(
     axis, lower, upper = (
         jnp.asarray(a, rotations.dtype) for a in (rigid.hinge_axis, rigid.hinge_lower, rigid.hinge_upper)
     )
-    return _project(rotations, axis, lower, upper, method, carry, limits)
+    rest = None if rigid.rest_rotation is None else jnp.asarray(rigid.rest_rotation, rotations.dtype)
+    return _project(rotations, axis, rest, lower, upper, method, carry, limits)
 
 
 @partial(jax.jit, static_argnames=("method", "carry", "limits"))
 def _project(
     rotations: Float[Array, "*b 15 3 3"],
     hinge_axis: Float[Array, "20 3"],
+    rest: Float[Array, "15 3 3"] | None,
     lower: Float[Array, "20"],
     upper: Float[Array, "20"],
     method: str,
@@ -76,6 +78,9 @@ def _project(
     limits: bool,
 ) -> Array:
     batch = rotations.shape[:-3]
+    if rest is not None:
+        rotations = compose(rotations, jnp.swapaxes(rest, -1, -2))  # what the hinges alone should make
+        rest = rest.reshape(len(FINGERS), 3, 3, 3)
     # A finger's three joints have four hinges: two at its base, one at each of the others.
     joints = rotations.reshape(*batch, len(FINGERS), 3, 3, 3)
     axes, lower, upper = (a.reshape(len(FINGERS), 4, *a.shape[1:]) for a in (hinge_axis, lower, upper))
@@ -89,7 +94,11 @@ def _project(
         made = compose(axis_angle_matrix(axes[:, 0], angles[0]), axis_angle_matrix(axes[:, 1], angles[1]))
         left = joints[..., 0, :, :]
         for k in (2, 3):
-            left = compose(compose(jnp.swapaxes(made, -1, -2), left), joints[..., k - 1, :, :])
+            residual = compose(jnp.swapaxes(made, -1, -2), left)
+            if rest is not None:  # from the parent's frame before its rest rotation to the frame after it
+                before = rest[:, k - 2]
+                residual = compose(compose(jnp.swapaxes(before, -1, -2), residual), before)
+            left = compose(residual, joints[..., k - 1, :, :])
             angles.append(hinge(left, k))
             made = axis_angle_matrix(axes[:, k], angles[k])
     else:

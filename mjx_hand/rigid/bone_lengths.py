@@ -56,5 +56,6 @@ def with_link_offsets(
         rigid,
         link_offset=offset,
         hinge_axis=AXES[axes](centres, rigid.side),
+        rest_rotation=None,
         tip_offset=tip_offset,
     )

@@ -4,12 +4,13 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import FINGERS, HINGE_LINKS, HINGES, LINKS, PARENTS, TIP_LINKS
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.mesh_folder import MESHES, file_stem, filling, write_meshes
-from mjx_hand.rigid.rigid_hand import RigidHand
+from mjx_hand.rigid.rigid_hand import RigidHand, axes_in_links
 
 BASES = ("fixed", "free", "actuated")
 WRIST_SLIDES = ("wrist_x", "wrist_y", "wrist_z")
@@ -97,6 +98,8 @@ def write_mjcf(
 
 def _add_link(parent: mujoco.MjsBody, rigid: RigidHand, link: int, name: str) -> mujoco.MjsBody:
     body = parent.add_body(name=name, pos=rigid.link_offset[link])
+    if link and rigid.rest_rotation is not None:
+        body.quat = Rotation.from_matrix(rigid.rest_rotation[link - 1]).as_quat(scalar_first=True)
     inertia = np.asarray(rigid.link_inertia[link])
     body.mass = float(rigid.link_mass[link])
     body.ipos = np.asarray(rigid.link_com[link])
@@ -163,11 +166,12 @@ def _add_wrist_joints(spec: mujoco.MjSpec, wrist: mujoco.MjsBody, base: str, pre
 
 def _add_hinges(spec: mujoco.MjSpec, bodies: list[mujoco.MjsBody], rigid: RigidHand, prefix: str, gains: Gains) -> None:
     # Two joints of one body turn as R = R(first) R(second): abduction comes first in HINGES, as RigidHand wants it.
+    axes = axes_in_links(rigid)
     for k, (name, link) in enumerate(zip(HINGES, HINGE_LINKS, strict=True)):
         bodies[link].add_joint(
             name=prefix + name,
             type=mujoco.mjtJoint.mjJNT_HINGE,
-            axis=rigid.hinge_axis[k],
+            axis=axes[k],
             range=[rigid.hinge_lower[k], rigid.hinge_upper[k]],
             armature=gains.armature,
         )

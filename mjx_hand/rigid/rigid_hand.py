@@ -17,7 +17,7 @@ class RigidHand:
     """A hand of 16 rigid links joined by 20 hinges (arXiv 2512.07359, section III).
 
     Lengths metres, masses kilograms, angles radians. Every link frame sits at its joint's centre and
-    is parallel to the hand frame at rest, so that a link's rotation relative to its parent *is* the
+    is parallel to the hand frame in the flat hand, so that a link's rotation relative to its parent *is* the
     MANO rotation of that joint and hinge axes are given in hand-frame directions. Links and fingers
     are in the order of `hand.joints.LINKS` and `FINGERS`, hinges in that of `hand.joints.HINGES`.
 
@@ -26,6 +26,9 @@ class RigidHand:
         link_offset: each link's joint centre relative to its parent's (row 0 is zero).
         hinge_axis: unit axes. A base joint turns as R = R(abduction) R(flexion); positive is flexion.
         hinge_lower, hinge_upper: limits.
+        rest_rotation: each joint's rotation while its hinges are at zero, R = R(hinges) rest_rotation, for a person
+            whose hinges do not pass through the flat hand; None is the identity. It is free of turns about the
+            joint's own axes, so that angles and limits are counted from the flat hand all the same.
         tip_offset: finger tips relative to the distal link's frame.
         link_mass, link_com, link_inertia: mass, centre of mass in the link frame, and inertia tensor
             about it (kg m^2, axes of the link frame).
@@ -51,6 +54,7 @@ class RigidHand:
     mesh_vertices: tuple[np.ndarray, ...]
     mesh_faces: tuple[np.ndarray, ...]
     capsule_links: tuple[int, ...] = static()
+    rest_rotation: Float[np.ndarray | Array, "15 3 3"] | None = None
     side: str = static()
     name: str = static()
 
@@ -66,7 +70,20 @@ def joint_rotations(angles: Float[Array | np.ndarray, "*b 20"], rigid: RigidHand
         mine = [h for h in range(NUM_HINGES) if HINGE_LINKS[h] == link]
         first = hinge[..., mine[0], :, :]
         out.append(first @ hinge[..., mine[1], :, :] if len(mine) == 2 else first)
-    return jnp.stack(out, axis=-3)
+    turned = jnp.stack(out, axis=-3)
+    return turned if rigid.rest_rotation is None else turned @ jnp.asarray(rigid.rest_rotation, turned.dtype)
+
+
+def axes_in_links(rigid: RigidHand) -> Float[np.ndarray, "20 3"]:
+    """Unit hinge axes in the frame of the link that each moves, as it lies with all hinges at zero.
+
+    They differ from `hinge_axis` by the rest rotation: R_a R0 = R0 R_b for b = R0ᵀ a.
+    """
+    axis = np.asarray(rigid.hinge_axis, dtype=float)
+    if rigid.rest_rotation is None:
+        return axis
+    rest = np.asarray(rigid.rest_rotation, dtype=float)[np.array(HINGE_LINKS) - 1]
+    return np.einsum("hji,hj->hi", rest, axis)
 
 
 def forward_kinematics(

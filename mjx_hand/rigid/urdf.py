@@ -10,12 +10,13 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial.transform import Rotation
 
 from mjx_hand.hand.joints import FINGERS, HINGE_LINKS, HINGES, LINKS, PARENTS, TIP_LINKS
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.mesh_folder import MESHES, file_stem, filling, write_meshes
 from mjx_hand.rigid.mjcf import WRIST_REACH, WRIST_SLIDES, WRIST_TURNS
-from mjx_hand.rigid.rigid_hand import RigidHand
+from mjx_hand.rigid.rigid_hand import RigidHand, axes_in_links
 
 # Links that carry no flesh. Without mass most simulators are singular, and PyBullet assumes a kilogram.
 _SMALL_MASS = 1e-5  # kg
@@ -59,14 +60,21 @@ def urdf_tree(rigid: RigidHand, *, wrist_joints: bool, gains: Gains) -> ET.Eleme
     for link, name in enumerate(LINKS):
         _add_link(robot, rigid, link, name)
     hinges_of = {link: [h for h, moved in enumerate(HINGE_LINKS) if moved == link] for link in range(1, len(LINKS))}
+    axes = axes_in_links(rigid)
     for link, hinges in hinges_of.items():
         parent, offset = LINKS[PARENTS[link]], np.asarray(rigid.link_offset[link])
         for hinge in hinges[:-1]:
             between = f"{HINGES[hinge]}_link"
             _add_small_link(robot, between)
-            _add_hinge(robot, rigid, hinge, parent, between, offset, gains)
+            joint = _add_joint(robot, HINGES[hinge], "revolute", parent, between, offset, rigid.hinge_axis[hinge])
+            _limit_hinge(joint, rigid, hinge, gains)
             parent, offset = between, np.zeros(3)
-        _add_hinge(robot, rigid, hinges[-1], parent, LINKS[link], offset, gains)
+        # The link's own frame begins at its last hinge, and with it the rest rotation.
+        last = hinges[-1]
+        rest = rigid.rest_rotation
+        rpy = (0.0, 0.0, 0.0) if rest is None else Rotation.from_matrix(rest[link - 1]).as_euler("xyz")
+        joint = _add_joint(robot, HINGES[last], "revolute", parent, LINKS[link], offset, axes[last], rpy)
+        _limit_hinge(joint, rigid, last, gains)
     for finger, link, tip in zip(FINGERS, TIP_LINKS, rigid.tip_offset, strict=True):
         _add_small_link(robot, f"{finger}_tip")
         _add_joint(robot, f"{finger}_tip_fixed", "fixed", LINKS[link], f"{finger}_tip", tip)
@@ -115,16 +123,7 @@ def _add_small_link(robot: ET.Element, name: str) -> None:
     _add_inertial(ET.SubElement(robot, "link", name=name), _SMALL_MASS, np.zeros(3), _SMALL_INERTIA)
 
 
-def _add_hinge(
-    robot: ET.Element,
-    rigid: RigidHand,
-    hinge: int,
-    parent: str,
-    child: str,
-    offset: Float[np.ndarray, "3"],
-    gains: Gains,
-) -> None:
-    joint = _add_joint(robot, HINGES[hinge], "revolute", parent, child, offset, rigid.hinge_axis[hinge])
+def _limit_hinge(joint: ET.Element, rigid: RigidHand, hinge: int, gains: Gains) -> None:
     limits = [rigid.hinge_lower[hinge], rigid.hinge_upper[hinge], gains.force_limit[hinge], gains.max_velocity]
     _add_limit(joint, limits)
 
@@ -153,9 +152,10 @@ def _add_joint(
     child: str,
     offset: Iterable[float],
     axis: Iterable[float] | None = None,
+    rpy: Iterable[float] = (0.0, 0.0, 0.0),
 ) -> ET.Element:
     joint = ET.SubElement(robot, "joint", name=name, type=kind)
-    ET.SubElement(joint, "origin", xyz=_text(offset), rpy="0 0 0")
+    ET.SubElement(joint, "origin", xyz=_text(offset), rpy=_text(rpy))
     ET.SubElement(joint, "parent", link=parent)
     ET.SubElement(joint, "child", link=child)
     if axis is not None:
