@@ -6,14 +6,16 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from mjx_hand.errors import InputError
-from mjx_hand.hand.joints import PARENTS, TIP_LINKS
+from mjx_hand.hand.joints import NUM_LINKS, PARENTS, TIP_LINKS
 from mjx_hand.hand.model import HandModel
 from mjx_hand.hand.skinning import joint_centres, shaped_template
 from mjx_hand.rigid.axes import AXES
 from mjx_hand.rigid.collision import palm_capsules, phalanx_capsules, skin_samples
+from mjx_hand.rigid.face_links import face_links
 from mjx_hand.rigid.limits import anatomical_limits
+from mjx_hand.rigid.pieces import close
 from mjx_hand.rigid.rigid_hand import RigidHand
-from mjx_hand.rigid.segments import close, cut, mass_properties
+from mjx_hand.rigid.segments import cut, mass_properties
 
 
 def build_rigid_hand(hand: HandModel, shape: ArrayLike | None = None, axes: str = "anatomical") -> RigidHand:
@@ -35,20 +37,20 @@ def build_rigid_hand(hand: HandModel, shape: ArrayLike | None = None, axes: str 
     centres = np.asarray(joint_centres(hand, shaped), dtype=float)
     tips = rest[np.asarray(hand.tip_vertices)]
 
-    pieces = cut(hand)
-    meshes = [piece.vertices(rest) for piece in pieces]
-    properties = [mass_properties(mesh, piece.faces) for mesh, piece in zip(meshes, pieces, strict=True)]
+    parts = cut(hand)
+    divided = parts.skin.vertices(rest)
+    solids = [segment.solid for segment in parts.segments]
+    properties = [mass_properties(solid.vertices(divided), solid.faces) for solid in solids]
     mass = np.array([p[0] for p in properties])
     whole = close(np.asarray(hand.faces))
     total = mass_properties(whole.vertices(rest), whole.faces)[0]
     if mass.min() <= 0 or total <= 0:
         raise InputError(f"shape {np.round(coefficients, 2).tolist()} turns the hand inside out; stay within +-5")
-    # Caps overlap where three segments meet, at the webs: scale so that the links weigh what the hand does.
-    scale = total / mass.sum()
+    scale = total / mass.sum()  # flat caps may overlap a little where three segments meet
 
-    samples = [
-        skin_samples(mesh, piece.faces[: piece.num_skin_faces]) for mesh, piece in zip(meshes, pieces, strict=True)
-    ]
+    surfaces = [segment.surface(divided, centre) for segment, centre in zip(parts.segments, centres, strict=True)]
+    owners = face_links(hand)
+    samples = [skin_samples(rest, np.asarray(hand.faces)[owners == link]) for link in range(NUM_LINKS)]
     points, areas = [s[0] for s in samples], [s[1] for s in samples]
     palm_ends, palm_radii = palm_capsules(points[0], areas[0], centres)
     finger_ends, finger_radii = phalanx_capsules(points, areas, centres, tips)
@@ -66,8 +68,8 @@ def build_rigid_hand(hand: HandModel, shape: ArrayLike | None = None, axes: str 
         link_inertia=np.stack([p[2] for p in properties]) * scale,
         capsule_ends=np.concatenate([palm_ends, finger_ends]) - centres[list(capsule_links)][:, None],
         capsule_radius=np.concatenate([palm_radii, finger_radii]),
-        mesh_vertices=tuple(mesh - centre for mesh, centre in zip(meshes, centres, strict=True)),
-        mesh_faces=tuple(piece.faces for piece in pieces),
+        mesh_vertices=tuple(mesh - centre for (mesh, _), centre in zip(surfaces, centres, strict=True)),
+        mesh_faces=tuple(faces for _, faces in surfaces),
         capsule_links=capsule_links,
         side=hand.side,
         name=hand.name,

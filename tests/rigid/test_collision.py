@@ -4,12 +4,15 @@ import trimesh
 
 from mjx_hand.hand.joints import LINKS, TIP_LINKS
 from mjx_hand.rigid.collision import segment_distance, surface_distance
-from mjx_hand.rigid.segments import cut
+from mjx_hand.rigid.face_links import face_links
+from tests.rigid.conftest import SHAPE
 
 
 def skin(hand, rigid, link):
-    """The vertices of a link's skin, without its caps (link frame)."""
-    return np.asarray(rigid.mesh_vertices[link])[: len(cut(hand)[link].vertex_ids)]
+    """The vertices of the skin that a link's capsules were fitted to (link frame)."""
+    rest = np.asarray(hand.template) + np.asarray(hand.shapedirs)[..., : len(SHAPE)] @ SHAPE
+    own = np.unique(np.asarray(hand.faces)[face_links(hand) == link])
+    return rest[own] - (np.asarray(hand.joint_regressor) @ rest)[link]
 
 
 def capsules(rigid, link):

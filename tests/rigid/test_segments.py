@@ -1,107 +1,222 @@
+"""The hand cut into segments, at random shapes of both sides."""
+
 import numpy as np
 import pytest
 import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import KDTree
 
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
+from mjx_hand.hand.model import HandModel
 from mjx_hand.pytree import replace
 from mjx_hand.rigid.build import build_rigid_hand
-from mjx_hand.rigid.segments import DENSITY, border_loops, cap_outlines, close, cut, face_links
-from tests.rigid.conftest import SHAPE
+from mjx_hand.rigid.isocurves import link_pull, patches
+from mjx_hand.rigid.rigid_hand import RigidHand
+from mjx_hand.rigid.segments import DENSITY, cut
+
+HANDS = {side: load_hand(side=side) for side in ("right", "left")}
+SHAPES = st.lists(st.floats(-3, 3), min_size=10, max_size=10)
 
 
-@pytest.fixture(scope="module")
-def open_hand():
-    return load_hand()
+def rest(hand: HandModel, shape: list[float]) -> np.ndarray:
+    return np.asarray(hand.template + hand.shapedirs @ np.array(shape, np.float32), float)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_segments_of_random_shapes_are_closed_and_sound(open_hand, seed):
-    shape = np.random.default_rng(seed).uniform(-3, 3, open_hand.num_shape)
-    rigid = build_rigid_hand(open_hand, shape)
+def winding_number(points: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """1 inside, 0 outside: the solid angle that an outward surface spans (van Oosterom and Strackee 1983)."""
+    a, b, c = np.moveaxis(vertices[faces][None] - points[:, None, None], 2, 0)
+    la, lb, lc = (np.linalg.norm(v, axis=-1) for v in (a, b, c))
+    triple = (a * np.cross(b, c)).sum(-1)
+    below = la * lb * lc + (a * b).sum(-1) * lc + (b * c).sum(-1) * la + (c * a).sum(-1) * lb
+    return 2 * np.arctan2(triple, below).sum(-1) / (4 * np.pi)
+
+
+def distance_to(points: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    corners = vertices[faces]
+    nearest = [trimesh.triangles.closest_point(corners, np.tile(p, (len(faces), 1))) for p in points]
+    return np.array([np.linalg.norm(near - p, axis=1).min() for near, p in zip(nearest, points, strict=True)])
+
+
+def assert_segments_are_closed(rigid: RigidHand) -> None:
     for vertices, faces in zip(rigid.mesh_vertices, rigid.mesh_faces, strict=True):
         mesh = trimesh.Trimesh(vertices, faces, process=False)
         assert mesh.is_watertight
         assert mesh.is_winding_consistent
         assert mesh.euler_number == 2
         assert mesh.volume > 0
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+@settings(deadline=None, max_examples=10)
+@given(shape=SHAPES)
+def test_any_shape_within_three_deviations_is_a_sound_body(side: str, shape: list[float]) -> None:
+    hand = HANDS[side]
+    rigid = build_rigid_hand(hand, shape)
+    assert_segments_are_closed(rigid)
     # An inertia tensor is that of a real body only if no principal moment exceeds the sum of the others.
     moments = np.linalg.eigvalsh(rigid.link_inertia)
     assert (moments > 0).all()
     assert (moments[:, 2] < moments[:, 0] + moments[:, 1]).all()
+    skin = rest(hand, shape)
+    np.testing.assert_allclose(
+        rigid.link_mass.sum(), DENSITY * trimesh.Trimesh(skin, hand.faces, process=False).volume, rtol=1e-5
+    )
+    # Every link's share of the mass is its own size's, nowhere near another's.
+    assert (rigid.link_mass / rigid.link_mass.sum() > 0.003).all()
+    assert 0.4 < rigid.link_mass[0] / rigid.link_mass.sum() < 0.75
+    # Capsules: of a finger's thickness, their surface nowhere far outside the skin.
+    assert (rigid.capsule_radius > 3e-3).all()
+    assert (rigid.capsule_radius < 3.5e-2).all()
+    links = list(rigid.capsule_links)
+    centres = np.asarray(hand.joint_regressor, float) @ skin
+    ends = np.asarray(rigid.capsule_ends) + centres[links][:, None]
+    along = np.linspace(0, 1, 4)[:, None, None]
+    axis = (ends[:, 0] + along * (ends[:, 1] - ends[:, 0])).reshape(-1, 3)  # on the capsules' axes, (4 c, 3)
+    assert (winding_number(axis, skin, hand.faces) > 0.5).all()
+    depth, _ = KDTree(skin).query(axis)
+    assert (depth > 0.2 * np.tile(rigid.capsule_radius, 4)).all()
+    assert np.median(depth / np.tile(rigid.capsule_radius, 4)) > 0.7
 
 
-def test_masses_sum_to_the_whole_hand(hand, rigid):
-    whole = close(np.asarray(hand.faces))
-    rest = hand.template + hand.shapedirs[..., : len(SHAPE)] @ SHAPE
-    volume = trimesh.Trimesh(whole.vertices(rest), whole.faces, process=False).volume
-    np.testing.assert_allclose(rigid.link_mass.sum(), DENSITY * volume, rtol=1e-5)
-    assert 0.2 < rigid.link_mass.sum() < 0.7  # a human hand weighs about 0.4 kg
+@pytest.mark.parametrize("side", ["right", "left"])
+@settings(deadline=None, max_examples=5)
+@given(shape=SHAPES)
+def test_drawn_at_rest_the_segments_are_the_skin_and_nothing_sticks_out(side: str, shape: list[float]) -> None:
+    hand = HANDS[side]
+    parts, skin = cut(hand), rest(hand, shape)
+    divided = parts.skin.vertices(skin)
+    centres = np.asarray(hand.joint_regressor, float) @ skin
+    area = 0.0
+    for segment, centre in zip(parts.segments, centres, strict=True):
+        vertices, faces = segment.surface(divided, centre)
+        own = segment.shell.num_skin_faces
+        area += trimesh.triangles.area(vertices[faces[:own]]).sum()
+        caps = vertices[len(segment.shell.vertex_ids) :]
+        outside = caps[::5][winding_number(caps[::5], skin, hand.faces) < 0.5]
+        assert len(outside) <= 2
+        assert (distance_to(outside, skin, hand.faces) < 5e-4).all()
+    # The segments' skin is the whole skin, each piece of it once.
+    np.testing.assert_allclose(area, trimesh.triangles.area(skin[hand.faces]).sum(), rtol=1e-9)
+    np.testing.assert_array_equal(divided[: len(skin)], skin)
 
 
-def test_segments_fill_the_hand_without_gap_or_overlap(open_hand):
-    rest = open_hand.template.astype(float)
-    whole = trimesh.Trimesh(rest, open_hand.faces, process=False)
-    assert whole.is_watertight
-    parts = [trimesh.Trimesh(piece.vertices(rest), piece.faces, process=False) for piece in cut(open_hand)]
-    np.testing.assert_allclose(sum(part.volume for part in parts), whole.volume, rtol=1e-9)
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_solids_fill_the_hand_without_gap_or_overlap(side: str) -> None:
+    hand = HANDS[side]
+    skin = rest(hand, [0.0] * 10)
+    parts = cut(hand)
+    divided = parts.skin.vertices(skin)
+    solids = [trimesh.Trimesh(s.solid.vertices(divided), s.solid.faces, process=False) for s in parts.segments]
+    assert all(solid.is_watertight for solid in solids)
+    whole = trimesh.Trimesh(skin, hand.faces, process=False).volume
+    np.testing.assert_allclose(sum(solid.volume for solid in solids), whole, rtol=1e-9)
 
 
-def test_inertia_agrees_with_a_sampled_solid(rigid):
+def test_a_joint_that_bends_opens_no_gap() -> None:
+    """Behind the back of each finger's border, where a gap would open, lies the segment's own dome."""
+    hand = HANDS["right"]
+    rigid = build_rigid_hand(hand)
+    for hinge, link in ((1, 1), (2, 2), (3, 3), (5, 4), (6, 5), (9, 7), (13, 10), (14, 11)):
+        vertices, faces = rigid.mesh_vertices[link], rigid.mesh_faces[link]
+        skin_ids = cut(hand).segments[link].shell.vertex_ids
+        near = vertices[: len(skin_ids)]
+        axis = np.asarray(rigid.hinge_axis[hinge])
+        bone = np.asarray(rigid.link_offset[link + 1] if link % 3 else rigid.tip_offset[(link - 1) // 3])
+        forward = bone / np.linalg.norm(bone)
+        back = np.cross(forward, axis)
+        back *= np.sign(back[1])  # towards the back of the hand
+        # Skin of the back, right at the joint: how far from it the knuckle's surface should stay as it turns.
+        reach = near @ back
+        knuckle = reach[np.abs(near @ forward) < 4e-3].max()
+        for turn in np.deg2rad([20, 40, 60]):
+            way = np.cos(turn) * back - np.sin(turn) * forward
+            points = np.linspace(0, 1, 60)[:, None] * knuckle * 1.3 * way
+            inside = winding_number(points, vertices, faces) > 0.5
+            assert points[inside] @ way > 0.0 if not inside.any() else (points[inside] @ way).max() > 0.7 * knuckle
+
+
+def test_borders_run_where_two_links_pull_alike() -> None:
+    hand = HANDS["right"]
+    skin, pull = patches(hand), link_pull(hand)
+    new = slice(hand.num_vertices, None)
+    blended = (pull[skin.corners[new]] * skin.shares[new][..., None]).sum(axis=1)
+    top = np.sort(blended, axis=1)[:, ::-1]
+    gap = (top[:, 0] - top[:, 1])[np.ptp(skin.shares[new], axis=1) > 0.01]
+    assert np.median(gap) < 1e-9
+    assert np.quantile(gap, 0.9) < 0.1  # not exactly where that would make a sliver, or where an island was mended
+    assert set(skin.face_links.tolist()) == set(range(16))
+
+
+def test_every_link_is_one_patch() -> None:
+    skin = patches(HANDS["right"])
+    pairs = np.asarray(trimesh.graph.face_adjacency(skin.faces))
+    same = pairs[skin.face_links[pairs[:, 0]] == skin.face_links[pairs[:, 1]]]
+    assert len(trimesh.graph.connected_components(same, nodes=np.arange(len(skin.faces)))) == 16
+
+
+def stray_palm_vertex(weight: float) -> HandModel:
+    """The open hand with one vertex in the middle of the palm that follows the thumb's tip."""
+    hand = HANDS["right"]
+    palm = int(np.linalg.norm(hand.template - hand.template.mean(axis=0), axis=1).argmin())
+    weights = np.array(hand.weights)
+    weights[palm] = weight * np.eye(16)[15]
+    return replace(hand, weights=weights)
+
+
+def test_stray_islands_join_their_surroundings() -> None:
+    stray = patches(stray_palm_vertex(200.0))
+    np.testing.assert_array_equal(stray.vertex_links, patches(HANDS["right"]).vertex_links)
+
+
+def test_a_link_without_skin_is_named() -> None:
+    weights = np.array(HANDS["right"].weights)
+    weights[:, 3] = 0
+    with pytest.raises(InputError, match="no skin follows index3"):
+        cut(replace(HANDS["right"], weights=weights))
+
+
+def test_a_joint_outside_the_skin_is_named() -> None:
+    regressor = np.array(HANDS["right"].joint_regressor)
+    regressor[6] *= 3
+    with pytest.raises(InputError, match="joint of middle3 lies outside the skin"):
+        cut(replace(HANDS["right"], joint_regressor=regressor))
+
+
+def test_a_mesh_in_two_parts_is_refused() -> None:
+    hand = HANDS["right"]
+    faces = np.concatenate([hand.faces, hand.faces.max() + 1 + np.arange(3, dtype=np.int32)[None]])
+    names = ("template", "weights", "shapedirs", "posedirs")
+    more = {name: np.concatenate([getattr(hand, name), getattr(hand, name)[:3]]) for name in names}
+    regressor = np.concatenate([hand.joint_regressor, np.zeros((16, 3), np.float32)], axis=1)
+    with pytest.raises(InputError, match="separate parts"):
+        cut(replace(hand, faces=faces, joint_regressor=regressor, **more))
+
+
+def test_a_hole_at_the_wrist_is_closed() -> None:
+    """MANO's own mesh ends in an open wrist."""
+    hand = HANDS["right"]
+    opened = replace(hand, faces=np.asarray(hand.faces)[:-18])
+    assert not trimesh.Trimesh(hand.template, opened.faces, process=False).is_watertight
+    rigid = build_rigid_hand(opened)
+    assert_segments_are_closed(rigid)
+    np.testing.assert_allclose(rigid.link_mass, build_rigid_hand(hand).link_mass, rtol=0.03)
+
+
+def test_inertia_agrees_with_a_sampled_solid() -> None:
     """Monte Carlo integration over points inside the link, which shares nothing with the surface formula."""
-    link = 2
-    mesh = trimesh.Trimesh(rigid.mesh_vertices[link], rigid.mesh_faces[link], process=False)
+    hand, link = HANDS["right"], 2
+    rigid = build_rigid_hand(hand)
+    parts = cut(hand)
+    solid = parts.segments[link].solid
+    vertices = solid.vertices(parts.skin.vertices(rest(hand, [0.0] * 10)))
+    mesh = trimesh.Trimesh(vertices - rigid.wrist_position - rigid.link_offset[:3].sum(axis=0), solid.faces)
     rng = np.random.default_rng(1)
     points = rng.uniform(mesh.bounds[0], mesh.bounds[1], (4000, 3))
-    # Winding number by solid angles: no ray-casting backend needed.
-    a, b, c = np.moveaxis(mesh.triangles[None] - points[:, None, None], 2, 0)
-    la, lb, lc = (np.linalg.norm(v, axis=-1) for v in (a, b, c))
-    triple = (a * np.cross(b, c)).sum(-1)
-    below = la * lb * lc + (a * b).sum(-1) * lc + (b * c).sum(-1) * la + (c * a).sum(-1) * lb
-    inside = points[np.arctan2(triple, below).sum(-1) > np.pi]
+    inside = points[winding_number(points, mesh.vertices, mesh.faces) > 0.5]
     com = inside.mean(axis=0)
     off = inside - com
     inertia = rigid.link_mass[link] * ((off**2).sum() * np.eye(3) - off.T @ off) / len(inside)
     np.testing.assert_allclose(com, rigid.link_com[link], atol=1e-3)
     np.testing.assert_allclose(inertia, rigid.link_inertia[link], atol=0.06 * np.trace(inertia))
-
-
-def test_every_link_is_one_patch(open_hand):
-    labels = face_links(open_hand)
-    assert set(labels.tolist()) == set(range(16))
-    pairs = np.asarray(trimesh.graph.face_adjacency(open_hand.faces))
-    same = pairs[labels[pairs[:, 0]] == labels[pairs[:, 1]]]
-    assert len(trimesh.graph.connected_components(same, nodes=np.arange(len(labels)))) == 16
-
-
-def test_stray_islands_join_their_surroundings(open_hand):
-    # Give one vertex in the middle of the palm to the thumb's tip: its faces would be an island of that link.
-    palm = int(np.linalg.norm(open_hand.template - open_hand.template.mean(axis=0), axis=1).argmin())
-    weights = np.array(open_hand.weights)
-    weights[palm] = 20 * np.eye(16)[15]
-    stray = replace(open_hand, weights=weights)
-    np.testing.assert_array_equal(face_links(stray), face_links(open_hand))
-
-
-def test_a_link_without_skin_is_named(open_hand):
-    weights = np.array(open_hand.weights)
-    weights[:, 3] = 0
-    with pytest.raises(InputError, match="index3"):
-        face_links(replace(open_hand, weights=weights))
-
-
-def test_border_loops_split_where_they_touch():
-    # Two triangles that share only vertex 0: one boundary that passes it twice.
-    loops = border_loops(np.array([[0, 1, 2], [0, 3, 4]]))
-    assert sorted(sorted(loop.tolist()) for loop in loops) == [[0, 1, 2], [0, 3, 4]]
-
-
-def test_outlines_pair_up_across_a_finger_base():
-    # A loop that borders segment 7 on the back and on the palm of the hand, with 8 and 9 to either side.
-    outlines = cap_outlines(list(range(8)), [7, 7, 8, 8, 7, 7, 9, 9], set())
-    assert sorted(sorted(outline.tolist()) for outline in outlines) == [[0, 1, 2, 4, 5, 6], [0, 6, 7], [2, 3, 4]]
-
-
-def test_a_chord_that_would_double_a_skin_edge_is_not_drawn():
-    outlines = cap_outlines(list(range(4)), [7, 7, 8, 8], {(0, 2)})
-    assert [sorted(outline.tolist()) for outline in outlines] == [[0, 1, 2, 3]]
