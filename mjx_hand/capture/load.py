@@ -1,12 +1,11 @@
 """`load_motion`: a hand motion from a file of any format that the project reads."""
 
-import zipfile
 from pathlib import Path
 
+from mjx_hand.capture.datasets.contents import WHOLE, read_contents
 from mjx_hand.capture.datasets.dataset_format import DatasetFormat, Request, dataset_formats
 from mjx_hand.errors import InputError
 from mjx_hand.motion import Motion
-from mjx_hand.motion.archive import open_arrays
 
 _SHOWN = 6  # how many names of an unknown archive the message lists
 _MARKER_FILES = (".c3d", ".trc", ".tsv")
@@ -41,13 +40,12 @@ def load_motion(
         raise InputError(f"{path}: no such file; give the path of a recording")
     if path.is_file() and path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; give the path of a recording")
-    archive = path.is_file() and (path.suffix == ".npz" or zipfile.is_zipfile(path))
-    arrays = open_arrays(path) if archive else {}
+    contents = read_contents(path)
     formats = dataset_formats()
     for known in formats:
-        if known.recognises(path, arrays):
-            return _asked_for(path, known, request, known.read(path, arrays, request))
-    raise InputError(f"{path}: {_found(path, arrays)}; formats read: {', '.join(known.name for known in formats)}")
+        if known.recognises(path, contents):
+            return _asked_for(path, known, request, known.read(path, contents, request))
+    raise InputError(f"{path}: {_found(path, contents)}; formats read: {', '.join(known.name for known in formats)}")
 
 
 def _asked_for(path: Path, known: DatasetFormat, request: Request, motion: Motion) -> Motion:
@@ -61,14 +59,16 @@ def _asked_for(path: Path, known: DatasetFormat, request: Request, motion: Motio
     return motion
 
 
-def _found(path: Path, arrays: dict) -> str:
+def _found(path: Path, contents: dict) -> str:
     if path.is_dir():
         return "a folder of no layout that is known here"
     if path.suffix.lower() in _MARKER_FILES:
         return "a marker recording, which needs a fit first"
-    if "schema" in arrays:
-        return f"an .npz of schema {arrays['schema']}, not a motion"
-    if arrays:
-        names = list(arrays)
-        return f"an .npz of {', '.join(names[:_SHOWN])}{' and more' if len(names) > _SHOWN else ''}"
+    if "schema" in contents:
+        return f"an .npz of schema {contents['schema']}, not a motion"
+    if WHOLE in contents:
+        return f"a lone {type(contents[WHOLE]).__name__} without names"
+    if contents:
+        names = [str(name) for name in contents]
+        return f"an {path.suffix} of {', '.join(names[:_SHOWN])}{' and more' if len(names) > _SHOWN else ''}"
     return f"not a recording that is known here (suffix {path.suffix or 'none'})"

@@ -1,0 +1,59 @@
+"""Calibration files beside a recording: YAML or JSON with shape coefficients and camera transforms."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from jaxtyping import Float
+
+from mjx_hand.errors import InputError
+from mjx_hand.motion.layout import numbers
+
+
+def read_settings(path: Path, needed: tuple[str, ...]) -> dict[str, Any]:
+    """The dictionary in a YAML (or JSON) file beside a recording.
+
+    Raises:
+        InputError: it is missing, is not one, or lacks what is needed.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; keep the dataset's folders as they were published")
+    try:
+        found = yaml.safe_load(path.read_text())
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not readable YAML ({' '.join(str(error).split())})") from None
+    missing = [name for name in needed if not isinstance(found, dict) or name not in found]
+    if missing:
+        raise InputError(f"{path}: has no {missing[0]!r}; it needs {', '.join(needed)}")
+    return found
+
+
+def betas(path: Path) -> Float[np.ndarray, "10"]:
+    """The subject's shape coefficients in a calibration file.
+
+    Raises:
+        InputError: the file is missing or has no ten numbers.
+    """
+    return numbers(path, {"betas": _listed(read_settings(path, ("betas",))["betas"])}, {"betas": (10,)})["betas"]
+
+
+def transform(path: Path, name: str) -> Float[np.ndarray, "3 4"]:
+    """The rigid transform of that name in a file of camera extrinsics (12 numbers, row by row).
+
+    Raises:
+        InputError: it is missing, or not such a transform.
+    """
+    found = read_settings(path, ("extrinsics",))["extrinsics"]
+    given = {name: _listed(found[name]).reshape(-1)} if isinstance(found, dict) and name in found else {}
+    matrix = numbers(path, given, {name: (12,)})[name].reshape(3, 4).astype(float)
+    if np.abs(matrix[:, :3] @ matrix[:, :3].T - np.eye(3)).max() > 1e-3:
+        raise InputError(f"{path}: {name} is not a rigid transform; get the calibration again")
+    return matrix
+
+
+def _listed(values: Any) -> np.ndarray:
+    try:
+        return np.asarray(values, float)
+    except (TypeError, ValueError):
+        return np.asarray(values, object)

@@ -1,0 +1,108 @@
+"""What a file holds: named values, or a list of them, read without running anything that the file names.
+
+Datasets ship pickles, and `.npy` and `.npz` files with pickles inside. All of them go through `hand.inert_pickle`;
+what is not an array of numbers stays a record until `plain` is asked for it.
+"""
+
+import io
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mjx_hand.errors import InputError
+from mjx_hand.hand import inert_pickle
+from mjx_hand.hand.inert_tensor import is_tensor, tensor
+
+PICKLES = (".pkl", ".pickle", ".p")
+WHOLE = ""  # the name of a value that is not a dictionary of named ones
+
+
+def read_contents(path: Path) -> dict[str, Any]:
+    """The named values in an `.npz`, or of the dictionary in an `.npy` or pickle; any other single value as `WHOLE`.
+
+    Nothing for other kinds of file, and for folders.
+
+    Raises:
+        InputError: the file is damaged, or names what no recording needs.
+    """
+    if not path.is_file():
+        return {}
+    if path.suffix == ".npz" or (path.suffix not in (*PICKLES, ".npy") and zipfile.is_zipfile(path)):
+        return _archive(path)
+    if path.suffix == ".npy":
+        value = _array(path.read_bytes(), str(path))
+    elif path.suffix in PICKLES:
+        value = _unpickled(path.read_bytes(), str(path))
+    else:
+        return {}
+    value = unwrapped(value)
+    return value if isinstance(value, dict) else {WHOLE: value}
+
+
+def unwrapped(value: Any) -> Any:
+    """What NumPy wrapped as an array of objects: the object of a lone one, else the list of them."""
+    if not isinstance(value, inert_pickle.Record) or not value.name.endswith("._reconstruct"):
+        return value
+    _, shape, dtype, _, data = value.state
+    if not dtype.args[0].startswith("O") or not isinstance(data, list):
+        return value
+    return data[0] if shape == () else data
+
+
+def plain(path: str | Path, name: str, value: Any) -> np.ndarray:
+    """The array that a value of `read_contents` stands for, whether NumPy's, PyTorch's or a list of numbers.
+
+    Args:
+        path: for the message.
+        name: what the message calls it.
+        value: what was found there.
+
+    Raises:
+        InputError: it stands for none.
+    """
+    try:
+        found = unwrapped(value)
+        if is_tensor(found):
+            return tensor(found)
+        if isinstance(found, list | tuple):
+            return np.stack([plain(path, name, item) for item in found]) if found else np.zeros(0)
+        return inert_pickle.array(found)
+    except InputError:
+        raise
+    except Exception as error:  # a damaged value raises anything at all
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError(f"{path}: cannot read {name!r} ({reason}); get the file again from its publisher") from None
+
+
+def _unpickled(data: bytes, where: str) -> Any:
+    return inert_pickle.unpickle(data, where, "recording", "its publisher")
+
+
+def _archive(path: Path) -> dict[str, Any]:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = [name for name in archive.namelist() if name.endswith(".npy")]
+            return {name[:-4]: unwrapped(_array(archive.read(name), f"{path}: {name[:-4]}")) for name in members}
+    except InputError:
+        raise
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error, KeyError, RuntimeError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError(f"{path}: not a readable .npz file ({reason})") from None
+
+
+def _array(data: bytes, where: str) -> Any:
+    """The array in an `.npy` file, or the records of its pickle."""
+    stream = io.BytesIO(data)
+    try:
+        version = np.lib.format.read_magic(stream)
+        read_header = np.lib.format.read_array_header_1_0 if version < (2, 0) else np.lib.format.read_array_header_2_0
+        _, _, dtype = read_header(stream)
+        if not dtype.hasobject:
+            stream.seek(0)
+            return np.lib.format.read_array(stream, allow_pickle=False)
+    except (ValueError, OSError, EOFError, SyntaxError, MemoryError) as error:
+        raise InputError(f"{where}: not a readable .npy array ({str(error).splitlines()[0]})") from None
+    return _unpickled(stream.read(), where)

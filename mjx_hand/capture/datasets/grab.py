@@ -1,0 +1,87 @@
+"""GRAB (Taheri et al., ECCV 2020, https://grab.is.tue.mpg.de): `grab/SUBJECT/SEQUENCE.npz`.
+
+Layout: https://github.com/otaheri/GRAB (README.md, grab/grab_preprocessing.py). `framerate` (120 frames a second), and
+pickled dictionaries `rhand` and `lhand`, each with:
+
+- `params`: `global_orient` (T, 3) and `fullpose` (T, 45), axis-angles (rad) about the flat hand; `hand_pose` (T, n),
+  the PCA coefficients of the same pose; `transl` (T, 3), metres.
+- `vtemp`: the path, below the dataset's root, of a mesh of the subject's own hand at rest; there are no coefficients.
+
+The tools make the hand with `flat_hand_mean=True`: nothing is to be added. Where `fullpose` is not there, the
+coefficients need the licensed file. `transl` is added to a hand that was turned about its wrist joint; the licensed
+file finds that joint, and the others, in the subject's mesh, or in the mean hand's where the mesh is not there. Poses
+are in the capture system's frame. Body, object, table and contacts are not read.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from mjx_hand.capture.datasets.contents import plain, unwrapped
+from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
+from mjx_hand.capture.datasets.mano_motion import chosen_side, mano_motion, recorded, turns
+from mjx_hand.capture.datasets.subject import full_pose, subject_of
+from mjx_hand.errors import InputError
+from mjx_hand.hand.mano_file import MANO_VERTICES
+from mjx_hand.motion import Motion
+from mjx_hand.motion.layout import numbers
+
+_KEYS = {"right": "rhand", "left": "lhand"}
+
+
+def _hands(contents: Contents) -> dict[str, dict[str, Any]]:
+    hands = {side: unwrapped(contents.get(key)) for side, key in _KEYS.items()}
+    return {
+        side: hand for side, hand in hands.items() if isinstance(hand, dict) and isinstance(hand.get("params"), dict)
+    }
+
+
+def _recognises(path: Path, contents: Contents) -> bool:
+    return "framerate" in contents and bool(_hands(contents))
+
+
+def _template(path: Path, hand: dict[str, Any]) -> np.ndarray | None:
+    """The subject's rest vertices (m), if the mesh that the recording names is there."""
+    root = path.absolute().parent.parent.parent
+    mesh = root / str(hand.get("vtemp", ""))
+    if mesh.suffix != ".ply" or not mesh.resolve().is_relative_to(root) or not mesh.is_file():
+        return None
+    try:
+        vertices = np.asarray(trimesh.load_mesh(mesh, process=False).vertices, float)
+    except Exception as error:  # the reader of meshes raises anything at all
+        raise InputError(f"{mesh}: not a readable mesh ({type(error).__name__}); get it again") from None
+    return numbers(mesh, {"vertices": vertices}, {"vertices": (MANO_VERTICES, 3)})["vertices"]
+
+
+def _read(path: Path, contents: Contents, request: Request) -> Motion:
+    hands = _hands(contents)
+    side = chosen_side(path, list(hands), request)
+    hand = hands[side]
+    found = {name: plain(path, f"{_KEYS[side]} {name}", value) for name, value in hand["params"].items()}
+    layout = {"global_orient": ("t", 3), "transl": ("t", 3)}
+    layout |= {"fullpose": ("t", 45)} if "fullpose" in found else {"hand_pose": ("t", "n")}
+    values = numbers(path, found, layout, finite=False)
+    valid = recorded(path, *values.values())
+    if "fullpose" in values:
+        pose = values["fullpose"].reshape(-1, 15, 3)
+    else:
+        pose = full_pose(path, request, side, values["hand_pose"], components=True, mean=False)
+    template = None if request.mano is None else _template(path, hand)
+    subject = subject_of(request, side, np.zeros(10), template=template)
+    rate = numbers(path, {"framerate": plain(path, "framerate", contents["framerate"])}, {"framerate": ()})["framerate"]
+    return mano_motion(
+        path,
+        orientation=turns(values["global_orient"], valid),
+        rotations=turns(pose, valid),
+        wrist=values["transl"] + subject.wrist,
+        valid=valid,
+        subject=subject,
+        fps=float(rate),
+        side=side,
+        source=f"GRAB {path.absolute().parent.name}/{path.stem}" + (", mean bones" if template is None else ""),
+    )
+
+
+FORMAT = DatasetFormat(name="GRAB (.npz with framerate and rhand, lhand)", recognises=_recognises, read=_read)

@@ -1,0 +1,112 @@
+"""What importers of MANO parameters share: choosing a hand, masking frames, and the motion that comes of it."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.spatial.transform import Rotation
+
+from mjx_hand.capture.datasets.dataset_format import Request
+from mjx_hand.capture.datasets.subject import Subject
+from mjx_hand.errors import InputError
+from mjx_hand.motion import Motion, check_motion
+from mjx_hand.motion.resample import matrix_quaternions
+
+Array = np.ndarray
+LONGEST = 10**7  # frames: a day at 120 a second; frame numbers beyond it are damage
+
+
+def chosen_side(path: Path, present: Sequence[str], request: Request) -> str:
+    """The hand to read: the one asked for, or the only one there.
+
+    Raises:
+        InputError: it is not there, or there are two and none was asked for.
+    """
+    if not present:
+        raise InputError(f"{path}: holds no hand")
+    if request.side is None and len(present) > 1:
+        raise InputError(f"{path}: holds both hands; choose one with side='right' or side='left'")
+    side = request.side or present[0]
+    if side not in present:
+        raise InputError(f"{path}: holds no {side} hand; give side={present[0]!r}")
+    return side
+
+
+def frame_rate(path: Path, request: Request) -> float:
+    """The rate that the request says, for recordings that do not.
+
+    Raises:
+        InputError: it says none.
+    """
+    if request.fps is None:
+        raise InputError(f"{path}: does not say its frame rate; give fps=, such as fps=30")
+    return request.fps
+
+
+def recorded(path: Path, *values: Array) -> Bool[Array, "t"]:
+    """Which frames have finite numbers in all of `values`, each (t, ...).
+
+    Raises:
+        InputError: none has.
+    """
+    frames = len(values[0])
+    finite = [np.isfinite(v).reshape(frames, -1).all(axis=1) for v in values]
+    return some(path, np.logical_and.reduce(finite))
+
+
+def some(path: Path, valid: Bool[Array, "t"]) -> Bool[Array, "t"]:
+    """`valid`, if any frame is.
+
+    Raises:
+        InputError: none is.
+    """
+    if not valid.any():
+        raise InputError(f"{path}: the hand is in none of its {len(valid)} frames; nothing to read")
+    return valid
+
+
+def turns(vectors: Float[Array, "t *n 3"], valid: Bool[Array, "t"]) -> Float[Array, "t *n 3 3"]:
+    """Axis-angles as matrices; the identity in frames that are not valid."""
+    known = np.where(valid.reshape(-1, *(1,) * (vectors.ndim - 1)), vectors, 0.0).astype(float)
+    return Rotation.from_rotvec(known.reshape(-1, 3)).as_matrix().reshape(*vectors.shape, 3)
+
+
+def mano_motion(
+    path: Path,
+    *,
+    orientation: Float[Array, "t 3 3"],
+    rotations: Float[Array, "t 15 3 3"],
+    wrist: Float[Array, "t 3"],
+    valid: Bool[Array, "t"],
+    subject: Subject,
+    fps: float,
+    side: str,
+    source: str,
+    wrist_known: bool = False,
+) -> Motion:
+    """The motion with these rotations about the flat hand and this place of the wrist joint (m).
+
+    Frames that are not valid may hold anything: the identity and zero take its place. Where the place was made with
+    the open hand's wrist (not `wrist_known`, not `subject.known`), the motion's source says so.
+
+    Raises:
+        InputError: the parts do not make a sound motion.
+    """
+    keep = valid[:, None, None]
+    return check_motion(
+        Motion(
+            fps=float(fps),
+            rotations=np.where(keep[:, None], rotations, np.eye(3)).astype(float),
+            wrist_position=np.where(keep[..., 0], wrist, 0.0).astype(float),
+            wrist_quaternion=matrix_quaternions(np.where(keep, orientation, np.eye(3)).astype(float)),
+            shape=subject.shape,
+            valid=valid,
+            link_offset=subject.link_offset,
+            tip_offset=subject.tip_offset,
+            side=side,
+            source=f"{source}, {side} hand"
+            + ("" if wrist_known or subject.known else "; wrist place of the open hand"),
+        ),
+        name=str(path),
+    )

@@ -1,0 +1,90 @@
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from mjx_hand.capture.load import load_motion
+from mjx_hand.errors import InputError
+from tests.capture.datasets.subjects import joints_of, licensed_file, licensed_hand, posed_joints, rest_joints, take
+
+TAKE = take()
+
+
+def hand_of(side: str, **changes) -> dict:
+    mean = licensed_hand(side).pose_mean.reshape(45)
+    return {
+        "rot": TAKE.pose[:, 0],
+        "pose": TAKE.pose[:, 1:].reshape(-1, 45) - mean,
+        "trans": TAKE.translation,
+        "shape": TAKE.shape,
+        "fitting_err": np.zeros(6),
+    } | changes
+
+
+def write(folder, **hands):
+    path = folder / "s01" / "box_grab_01.mano.npy"
+    path.parent.mkdir(exist_ok=True)
+    np.save(path, np.array(hands, dtype=object))
+    return path
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_joints_are_where_the_datasets_own_formula_puts_them(tmp_path, side):
+    path = write(tmp_path, right=hand_of("right"), left=hand_of("left"))
+    motion = load_motion(path, side=side, mano=licensed_file(tmp_path, side))
+    expected = posed_joints(rest_joints(licensed_hand(side), TAKE.shape), TAKE.pose) + TAKE.translation[:, None]
+    np.testing.assert_allclose(joints_of(motion), expected[:, :16], atol=1e-5)
+    np.testing.assert_allclose(
+        motion.rotations.reshape(-1, 3, 3), Rotation.from_rotvec(TAKE.pose[:, 1:].reshape(-1, 3)).as_matrix(), atol=1e-6
+    )
+    np.testing.assert_allclose(motion.shape, TAKE.shape)
+    assert (motion.fps, motion.side, motion.source) == (30.0, side, f"ARCTIC s01/box_grab_01, {side} hand")
+
+
+def test_shape_may_be_given_for_each_frame_and_one_wild_one_does_not_matter(tmp_path):
+    shapes = np.tile(TAKE.shape, (6, 1))
+    shapes[2] += 40
+    motion = load_motion(write(tmp_path, right=hand_of("right", shape=shapes)), mano=licensed_file(tmp_path))
+    np.testing.assert_allclose(motion.shape, TAKE.shape)
+
+
+def test_frames_that_are_not_finite_are_gaps(tmp_path):
+    pose = hand_of("right")["pose"]
+    pose[3, 7] = np.nan
+    motion = load_motion(write(tmp_path, right=hand_of("right", pose=pose)), mano=licensed_file(tmp_path))
+    assert np.flatnonzero(~motion.valid).tolist() == [3]
+    np.testing.assert_array_equal(motion.rotations[3], np.tile(np.eye(3), (15, 1, 1)))
+
+
+@pytest.mark.parametrize(
+    ("hands", "choice", "message"),
+    [
+        ({"right": {}, "left": {}}, {}, r"both hands; choose one with side='right' or side='left'"),
+        ({"right": {}}, {"side": "left"}, r"no left hand; give side='right'"),
+        ({"right": {}}, {}, r"relative to MANO's mean pose need MANO_RIGHT\.pkl: give mano="),
+        ({"right": {"pose": np.zeros((6, 44))}}, {}, r"pose has shape \(6, 44\), expected \(6, 45\)"),
+        ({"right": {"pose": np.full((6, 45), np.nan)}}, {}, "in none of its 6 frames"),
+        ({"right": {"shape": np.zeros(11)}}, {}, r"shape has shape \(11,\), expected \(10\)"),
+        ({"right": {"trans": "far"}}, {}, "cannot read 'right trans'"),
+        ({"right": {}}, {"fps": 25.0}, "recorded at 30 frames a second; leave out fps=25"),
+        ({"right": {}}, {"sequence": "a"}, "holds one recording; leave out sequence='a'"),
+    ],
+)
+def test_refusals(tmp_path, hands, choice, message):
+    path = write(tmp_path, **{side: hand_of(side, **changes) for side, changes in hands.items()})
+    if "fps" in choice or "sequence" in choice:
+        choice = choice | {"mano": licensed_file(tmp_path)}
+    with pytest.raises(InputError, match=message) as refusal:
+        load_motion(path, **choice)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_file_without_translation_is_named(tmp_path):
+    hand = hand_of("right")
+    del hand["trans"]
+    with pytest.raises(InputError, match="has no 'trans'; it needs rot, pose, trans, shape"):
+        load_motion(write(tmp_path, right=hand))
+
+
+def test_the_wrong_sides_model_is_refused(tmp_path):
+    with pytest.raises(InputError, match="holds a left hand, but side is 'right'"):
+        load_motion(write(tmp_path, right=hand_of("right")), mano=licensed_file(tmp_path, "left"))
