@@ -17,7 +17,7 @@ def load_motion(
     side: str | None = None,
     sequence: str | None = None,
     mano: str | Path | None = None,
-    fps: float | None = None,
+    fps: float | int | None = None,
 ) -> Motion:
     """Read a motion; the format is recognised from the file itself (`mjx_hand/capture/datasets`, one module each).
 
@@ -35,7 +35,12 @@ def load_motion(
     path = Path(path)
     if side not in (None, "right", "left"):
         raise InputError(f"side is {side!r}; give 'right' or 'left'")
-    request = Request(side=side, sequence=sequence, mano=Path(mano) if mano is not None else None, fps=fps)
+    request = Request(
+        side=side,
+        sequence=sequence,
+        mano=Path(mano) if mano is not None else None,
+        fps=float(fps) if fps is not None else None,
+    )
     if not path.exists():
         raise InputError(f"{path}: no such file; give the path of a recording")
     if path.is_file() and path.stat().st_size == 0:

@@ -117,8 +117,9 @@ def _made(where: str, found: dict[str, Array], right: Array, rotations: Array, m
         joints = (
             numbers(where, found, {"pred_keypoints_3d": (count, 21, 3)}, finite=False)["pred_keypoints_3d"] @ mirror
         )
-    off = np.abs(rotations @ np.swapaxes(rotations, -1, -2) - np.eye(3)).max(initial=0)
-    if off > 0.01 or (np.linalg.det(rotations) < 0).any():  # half precision is off by 0.002
+    given = rotations[np.isfinite(rotations).all(axis=(1, 2, 3))]
+    off = np.abs(given @ np.swapaxes(given, -1, -2) - np.eye(3)).max(initial=0)
+    if off > 0.01 or (np.linalg.det(given) < 0).any():  # half precision is off by 0.002
         raise InputError(f"{where}: global_orient or hand_pose holds matrices that are not rotations")
     return [
         _Hand(

@@ -15,14 +15,14 @@ MESH = "tools/subject_meshes/male/s4_rhand.ply"
 def write(root, *, full: bool = True, sides=("right",), rate: float = 120.0, **params):
     path = root / "grab" / "s4" / "mug_pass_1.npz"
     path.parent.mkdir(parents=True)
-    hands = {}
+    hands: dict = {"contact": {"body": np.zeros(3)}}
     for side in sides:
         fingers = {"hand_pose": TAKE.coefficients(side, mean=False)}
         if full:
             fingers["fullpose"] = TAKE.pose[:, 1:].reshape(-1, 45)
         given = {"global_orient": TAKE.pose[:, 0], "transl": TAKE.translation} | fingers | params
         hands[f"{side[0]}hand"] = {"params": given, "vtemp": MESH.replace("rhand", f"{side[0]}hand")}
-    np.savez(path, framerate=rate, n_comps=24, gender="male", obj_name="mug", contact={"body": np.zeros(3)}, **hands)
+    np.savez(path, framerate=rate, n_comps=24, gender="male", obj_name="mug", **hands)
     return path
 
 
