@@ -20,6 +20,7 @@ LAYOUT: dict[str, tuple[int | str, ...]] = {
     "shape": ("s",),
     "valid": ("t",),
 }
+_BY_FRAME = {"rotations": np.eye(3), "wrist_position": np.zeros(3), "wrist_quaternion": np.array([1.0, 0, 0, 0])}
 _OFFSETS = {"link_offset": NUM_LINKS, "tip_offset": len(FINGERS)}  # a recording may have them
 
 
@@ -133,13 +134,13 @@ def save_motion(motion: Motion, path: str | Path) -> None:
 
 
 def load_motion_file(path: str | Path) -> Motion:
-    """Read a motion that `save_motion` wrote.
+    """Read a motion that `save_motion` wrote. Frames that hold NaN or infinity become gaps.
 
     Raises:
         InputError: not such a file, or its contents are not a well-formed motion.
     """
     a = load_arrays(path, SCHEMA)
-    n = numbers(path, a, LAYOUT)
+    n = numbers(path, _without_bad_frames(numbers(path, a, LAYOUT, finite=False)), LAYOUT)
     offsets = numbers(path, a, {field: (rows, 3) for field, rows in _OFFSETS.items() if field in a})
     return check_motion(
         Motion(
@@ -156,3 +157,16 @@ def load_motion_file(path: str | Path) -> Motion:
         ),
         name=str(path),
     )
+
+
+def _without_bad_frames(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Frames that are not finite marked as gaps, which hold the identity; nothing is changed if all are bad."""
+    finite = [np.isfinite(arrays[field]).all(axis=tuple(range(1, arrays[field].ndim))) for field in _BY_FRAME]
+    good = np.logical_and.reduce(finite)
+    if good.all() or not good.any():
+        return arrays
+    mended = {
+        field: np.where(good.reshape(-1, *(1,) * (arrays[field].ndim - 1)), arrays[field], held)
+        for field, held in _BY_FRAME.items()
+    }
+    return arrays | mended | {"valid": good & (arrays["valid"] > 0)}

@@ -22,12 +22,14 @@ class FingerChains:
         axis: the hinges from abduction outwards.
         base: centre of the first joint, where the first two hinges are.
         bone: from the first joint to the second, the second to the third, the third to the tip.
+        rest: rotation of each joint while its hinges are at zero.
         lower, upper: limits of the hinges.
     """
 
     axis: Float[Array, "5 4 3"]
     base: Float[Array, "5 3"]
     bone: Float[Array, "5 3 3"]
+    rest: Float[Array, "5 3 3 3"]
     lower: Float[Array, "5 4"]
     upper: Float[Array, "5 4"]
 
@@ -35,10 +37,12 @@ class FingerChains:
 def finger_chains(rigid: RigidHand) -> FingerChains:
     """The five fingers of a hand."""
     offset = jnp.asarray(rigid.link_offset)[1:].reshape(len(FINGERS), 3, 3)
+    rest = jnp.tile(jnp.eye(3), (15, 1, 1)) if rigid.rest_rotation is None else jnp.asarray(rigid.rest_rotation)
     return FingerChains(
         axis=jnp.asarray(rigid.hinge_axis).reshape(len(FINGERS), 4, 3),
         base=offset[:, 0],
         bone=jnp.concatenate([offset[:, 1:], jnp.asarray(rigid.tip_offset)[:, None]], axis=1),
+        rest=rest.reshape(len(FINGERS), 3, 3, 3),
         lower=jnp.asarray(rigid.hinge_lower).reshape(len(FINGERS), 4),
         upper=jnp.asarray(rigid.hinge_upper).reshape(len(FINGERS), 4),
     )
@@ -57,7 +61,7 @@ def finger_places(
     for k in (1, 2, 3):
         axes.append(turn(rotation, chains.axis[:, k]))
         centres.append(centre)
-        rotation = compose(rotation, turns[..., k, :, :])
+        rotation = compose(compose(rotation, turns[..., k, :, :]), chains.rest[:, k - 1])
         centre = centre + turn(rotation, chains.bone[:, k - 1])
         places.append(centre)
     still = jnp.zeros_like(centre)

@@ -148,3 +148,14 @@ def test_demonstration_with_another_number_of_object_frames_is_refused(tmp_path,
 @given(motion=motions())
 def test_well_formed_motions_pass_the_check(motion):
     assert check_motion(motion) is motion
+
+
+def test_frames_that_are_not_finite_become_gaps(stored):
+    rotations = np.tile(np.eye(3), (4, 15, 1, 1))
+    rotations[1, 7, 0, 2] = np.nan
+    position = np.ones((4, 3))
+    position[3, 1] = np.inf
+    motion = load_motion_file(stored(rotations=rotations, wrist_position=position))
+    assert motion.valid.tolist() == [True, False, True, False]
+    np.testing.assert_array_equal(motion.rotations[1], np.tile(np.eye(3), (15, 1, 1)))
+    assert np.isfinite(motion.wrist_position).all()

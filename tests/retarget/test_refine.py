@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from mjx_hand.capture.load import load_motion
 from mjx_hand.hand.load import load_hand
 from mjx_hand.projection import project
+from mjx_hand.pytree import replace
 from mjx_hand.retarget.finger_chain import by_finger, finger_chains, finger_places
 from mjx_hand.retarget.refine import RefineWeights, recorded_places, refine_angles
 from mjx_hand.retarget.sequence import rigid_hand_of
@@ -39,6 +40,8 @@ def turned_off_axis(angles, rigid, degrees, seed=1):
 
 def test_places_are_those_of_the_hands_kinematics_and_slopes_those_of_differences(rigid):
     angles = poses(rigid)
+    tilt = Rotation.from_rotvec(0.1 * np.random.default_rng(3).normal(size=(15, 3))).as_matrix()
+    rigid = replace(rigid, rest_rotation=tilt)
     with jax.enable_x64(True):
         chains = finger_chains(rigid)
         places, slopes = finger_places(by_finger(angles), chains)
@@ -117,8 +120,8 @@ def test_no_fit_of_scipys_is_better(rigid):
         ours[frame, finger] = 0.5 * np.sum(residuals(found[frame, part].astype(float), frame, finger) ** 2)
     # Five iterations are all but converged, except for a few fingers that slide along a limit.
     assert np.quantile(ours / best, 0.9) < 1.001
-    assert (ours / best).max() < 1.5
-    assert ours.sum() < 1.03 * best.sum()
+    assert (ours / best).max() < 2
+    assert ours.sum() < 1.05 * best.sum()
 
 
 def test_limits_hold_and_out_of_reach_is_as_near_as_can_be(rigid):
