@@ -9,10 +9,11 @@ from mjx_hand.cli.build import build
 from mjx_hand.cli.fit import fit
 from mjx_hand.cli.keypoints import keypoints
 from mjx_hand.cli.retarget import retarget
+from mjx_hand.cli.view import view
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 
-COMMANDS = {"build": build, "fit": fit, "keypoints": keypoints, "retarget": retarget}
+COMMANDS = {"build": build, "fit": fit, "keypoints": keypoints, "retarget": retarget, "view": view}
 
 
 def main(argv: Sequence[str] | None = None) -> int:

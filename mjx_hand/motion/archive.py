@@ -79,6 +79,18 @@ def open_arrays(path: str | Path) -> dict[str, np.ndarray]:
         raise InputError(f"{path}: not a readable .npz file ({reason})") from None
 
 
+def schema_of(path: str | Path) -> str:
+    """The schema of a file that `save_arrays` wrote; empty for any other file."""
+    path = Path(path)
+    if not (path.is_file() and zipfile.is_zipfile(path)):
+        return ""
+    try:
+        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
+            return str(file["schema"]) if "schema" in file.files else ""
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error, KeyError):
+        return ""
+
+
 def load_arrays(path: str | Path, schema: str) -> dict[str, np.ndarray]:
     """Arrays of a file that `save_arrays` wrote with this schema.
 

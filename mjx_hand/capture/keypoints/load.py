@@ -46,6 +46,16 @@ def load_keypoints(
     return replace(recording, fps=recording.fps or fps)
 
 
+def is_keypoint_file(path: str | Path) -> bool:
+    """Whether `load_keypoints` reads this file.
+
+    Raises:
+        InputError: the file is damaged.
+    """
+    path = Path(path)
+    return path.is_file() and recognised(path, keypoint_contents(path)) is not None
+
+
 def keypoint_contents(path: Path) -> Any:
     """What the readers look at: an `.npz`'s arrays, a `.json`'s value, a `.csv`'s lines; None for other files.
 

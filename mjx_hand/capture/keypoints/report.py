@@ -17,6 +17,7 @@ class KeypointReport:
     """How well a motion explains keypoints, over its valid frames; metres and radians.
 
     Attributes:
+        fitted: the fitted hand's own 21 keypoints in the recording's frame; NaN in frames that are not valid.
         distance: mean distance of each of the 21 keypoints from the fitted hand's; NaN for one that is never seen.
         direction: mean angle between each finger bone seen and fitted, fingers in MANO's order, knuckle outwards.
         bone_error: how much longer each finger bone is in the fitted hand than the median of what was seen.
@@ -26,6 +27,7 @@ class KeypointReport:
             of the fitted hand, over the same keypoints and frames; NaN where no three frames in a row are valid.
     """
 
+    fitted: Float[Array, "t 21 3"]
     distance: Float[Array, "21"]
     direction: Float[Array, "5 3"]
     bone_error: Float[Array, "5 3"]
@@ -40,6 +42,7 @@ def make_report(
 ) -> KeypointReport:
     """The report on keypoints as recorded (NaN where missing) and as fitted, of which `valid` frames count."""
     mask = valid[:, None] & np.isfinite(seen).all(axis=-1)
+    shown = np.where(valid[:, None, None], fitted, np.nan)
     seen = np.where(mask[..., None], seen, np.nan)
     fitted = np.where(mask[..., None], fitted, np.nan)
     before, after = lengths(seen)[:, :NUM_FINGER_BONES], lengths(fitted)[:, :NUM_FINGER_BONES]
@@ -48,6 +51,7 @@ def make_report(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # means of nothing are NaN, as documented
         return KeypointReport(
+            fitted=shown,
             distance=np.nanmean(np.linalg.norm(fitted - seen, axis=-1), axis=0),
             direction=np.nanmean(np.arctan2(sine, cosine), axis=0),
             bone_error=(np.nanmedian(after, axis=0) - np.nanmedian(before, axis=0)).reshape(5, 3),

@@ -1,0 +1,90 @@
+"""Recordings as scenes: what `mjx-hand view` shows of each kind of file."""
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial import KDTree
+
+from mjx_hand.capture.keypoints.skeleton import BONES
+from mjx_hand.capture.recording import MarkerRecording
+from mjx_hand.errors import InputError
+from mjx_hand.hand.model import HandModel
+from mjx_hand.motion import Demonstration, JointMotion, Motion
+from mjx_hand.pytree import replace
+from mjx_hand.retarget.sequence import retarget_errors, retarget_sequence, rigid_hand_of
+from mjx_hand.rigid.build import build_rigid_hand
+from mjx_hand.view.hand_scene import object_layers, skin_layer, skin_vertices, skinned_motion, twin_layer
+from mjx_hand.view.scene import Colour, Curve, PointLayer, Scene, SkinLayer
+
+MARKER: Colour = (46, 107, 186)
+KEYPOINT: Colour = (38, 130, 120)
+
+
+def motion_scene(motion: Motion, hand: HandModel, up: str = "+z") -> Scene:
+    """The hand of a motion, its rigid twin beside it in the list, and how far the twin's finger tips are from it."""
+    rigid = rigid_hand_of(motion, hand)
+    angles = retarget_sequence(motion, rigid)
+    tips = retarget_errors(motion, angles, rigid).tip_position.mean(axis=1)
+    curve = Curve("finger tips of the twin", np.where(motion.valid, 1e3 * tips, np.nan), "mm")
+    layers = (skin_layer(motion, hand), twin_layer(angles, rigid, shown=False))
+    return Scene(title=motion.source or "motion", fps=motion.fps, layers=layers, curves=(curve,), up=up)
+
+
+def joint_motion_scene(motion: JointMotion, hand: HandModel, up: str = "+z") -> Scene:
+    """The rigid twin of a joint motion, of the mean shape, which such a file does not hold."""
+    rigid = build_rigid_hand(hand)
+    skin = skin_layer(skinned_motion(motion, np.zeros(1), rigid), hand, shown=False)
+    return Scene(title=motion.source or "joint motion", fps=motion.fps, layers=(twin_layer(motion, rigid), skin), up=up)
+
+
+def demonstration_scene(demonstration: Demonstration, hand: HandModel) -> Scene:
+    """The twin and the object of a demonstration, above its table."""
+    rigid = build_rigid_hand(hand, demonstration.shape)
+    motion = demonstration.motion
+    skin = skin_layer(skinned_motion(motion, demonstration.shape, rigid), hand)
+    layers = (skin, twin_layer(motion, rigid, shown=False), *object_layers(demonstration))
+    title = f"{demonstration.grasp}: {demonstration.source or 'demonstration'}"
+    return Scene(title=title, fps=motion.fps, layers=layers, ground=0.0)
+
+
+def with_markers(scene: Scene, recording: MarkerRecording) -> Scene:
+    """The scene with the markers that a hand was fitted to, and how far they are from its skin.
+
+    Raises:
+        InputError: the recording has another number of frames, or the scene has no skin.
+    """
+    name = recording.source or "markers"
+    if recording.num_frames != scene.num_frames:
+        raise InputError(
+            f"{name}: has {recording.num_frames} frames, the motion {scene.num_frames}; give the pair that belongs"
+        )
+    points = np.where(recording.visible[..., None], recording.positions, np.nan)
+    curve = Curve("markers from the skin", 1e3 * distance_from_skin(_skin(scene), points), "mm")
+    layer = PointLayer("markers", points, MARKER, radius=0.0035)
+    return replace(scene, layers=(*scene.layers, layer), curves=(curve, *scene.curves))
+
+
+def with_keypoints(scene: Scene, seen: Float[np.ndarray, "t 21 3"], fitted: Float[np.ndarray, "t 21 3"]) -> Scene:
+    """The scene with the keypoints that its hand was fitted to, and how far (m) the hand's own are from them."""
+    away = np.linalg.norm(fitted - seen, axis=-1)
+    count = np.isfinite(away).sum(axis=1)
+    mean = np.where(count > 0, np.nansum(away, axis=1) / np.maximum(count, 1), np.nan)
+    layer = PointLayer("keypoints", seen, KEYPOINT, lines=BONES.reshape(-1, 2))
+    curve = Curve("keypoints from the hand's", 1e3 * mean, "mm")
+    return replace(scene, layers=(*scene.layers, layer), curves=(curve, *scene.curves))
+
+
+def distance_from_skin(skin: SkinLayer, points: Float[np.ndarray, "t m 3"]) -> Float[np.ndarray, "t"]:
+    """Mean distance (m) in each frame of the points from the nearest vertex; NaN where none is seen."""
+    out = np.full(len(points), np.nan)
+    for frame, row in enumerate(points):
+        seen = row[np.isfinite(row).all(axis=1)]
+        if len(seen):
+            out[frame] = KDTree(skin_vertices(skin, frame)).query(seen)[0].mean()
+    return out
+
+
+def _skin(scene: Scene) -> SkinLayer:
+    skins = [layer for layer in scene.layers if isinstance(layer, SkinLayer)]
+    if not skins:
+        raise InputError(f"{scene.title}: shows no skinned hand to compare with")
+    return skins[0]
