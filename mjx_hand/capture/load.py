@@ -50,7 +50,8 @@ def load_motion(
     for known in formats:
         if known.recognises(path, contents):
             return _asked_for(path, known, request, known.read(path, contents, request))
-    raise InputError(f"{path}: {_found(path, contents)}; formats read: {', '.join(known.name for known in formats)}")
+    names = ", ".join(known.name.split(" (")[0] for known in formats)
+    raise InputError(f"{path}: {_found(path, contents)}; formats read: {names} (docs/datasets.md says how)")
 
 
 def _asked_for(path: Path, known: DatasetFormat, request: Request, motion: Motion) -> Motion:

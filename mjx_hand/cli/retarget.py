@@ -20,16 +20,22 @@ def retarget(
     out: Path,
     method: str = "exact",
     mano: Path | None = None,
+    side: str | None = None,
+    sequence: str | None = None,
+    fps: float | None = None,
 ) -> None:
     """Project a recorded motion onto the 20 hinges of the rigid hand and report the errors.
 
     Args:
-        recording: a motion file: the project's own .npz, or a format of mjx_hand/capture/datasets.
+        recording: a motion: the project's own .npz, or a file or folder of a dataset (docs/datasets.md).
         out: the .npz to write: joint angles (rad) and wrist poses.
         method: how rotations become angles: exact, or for comparison paper, bch2, naive.
         mano: a licensed MANO file, for recordings made with one; without it, the open hand.
+        side: right or left, where both hands are recorded.
+        sequence: the name of one recording, where a file has several.
+        fps: frames a second, where the recording does not say.
     """
-    motion = load_motion(recording)
+    motion = load_motion(recording, side=side, sequence=sequence, mano=mano, fps=fps)
     rigid = rigid_hand_of(motion, load_hand(mano, motion.side))
     began = time.perf_counter()
     joint_motion = retarget_sequence(motion, rigid, method)

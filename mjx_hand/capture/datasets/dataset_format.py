@@ -35,7 +35,7 @@ class DatasetFormat:
     """A recording format. A module of this package that names one `FORMAT` adds it; nothing else needs an edit.
 
     Attributes:
-        name: one line for people: what the format is called and what marks it.
+        name: one line for people: what the format is called and, in brackets, what marks it.
         recognises: whether a file or folder is of this format, from its path and its contents: the named values of an
             `.npz`, or of the dictionary in a `.npy` or pickle, read without running it; else empty.
         read: the motion in it, as the request says; raises InputError where the file is of the format but not sound.

@@ -78,6 +78,41 @@ def test_refusals(tmp_path, hands, choice, message):
     assert "\n" not in str(refusal.value)
 
 
+def params() -> dict:
+    hands = {"r": hand_of("right", shape=np.tile(TAKE.shape, (6, 1))), "l": hand_of("left")}
+    return {f"{name}_{letter}": value for letter, hand in hands.items() for name, value in hand.items()}
+
+
+def save(path, **contents):
+    np.save(path, np.array(contents, dtype=object))
+    return path
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_the_same_in_processed_sequences_and_in_a_split(tmp_path, side):
+    mano = licensed_file(tmp_path, side)
+    raw = load_motion(write(tmp_path, **{side: hand_of(side)}), mano=mano)
+    one = save(tmp_path / "box_grab_01.npy", params=params(), cam_coord={"is_valid": np.ones((6, 9))})
+    split = save(tmp_path / "p1_val.npy", data_dict={"s05/box_grab_01": {"params": params()}, "s05/b": {}}, imgnames=[])
+    for motion in (
+        load_motion(one, side=side, mano=mano),
+        load_motion(split, sequence="s05/box_grab_01", side=side, mano=mano),
+    ):
+        np.testing.assert_array_equal(motion.rotations, raw.rotations)
+        np.testing.assert_array_equal(motion.wrist_position, raw.wrist_position)
+    assert load_motion(split, sequence="s05/box_grab_01", side=side, mano=mano).source.startswith(
+        "ARCTIC s05/box_grab_01"
+    )
+
+
+def test_a_splits_sequence_must_be_chosen(tmp_path):
+    split = save(tmp_path / "p1_val.npy", data_dict={f"s05/{k}": {"params": params()} for k in range(9)})
+    with pytest.raises(InputError, match=r"holds several sequences; choose one with sequence=: s05/0, .*, and more"):
+        load_motion(split)
+    with pytest.raises(InputError, match=r"holds no sequence 'x'; choose one with sequence=: s05/0"):
+        load_motion(split, sequence="x")
+
+
 def test_a_file_without_translation_is_named(tmp_path):
     hand = hand_of("right")
     del hand["trans"]
