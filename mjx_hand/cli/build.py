@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 
 from mjx_hand.cli.output import print_table
+from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import HINGES, LINKS
 from mjx_hand.hand.load import load_hand
 from mjx_hand.rigid.build import build_rigid_hand
@@ -20,6 +21,8 @@ def build(
     side: Literal["right", "left"] = "right",
     mano: Path | None = None,
     wrist_joints: bool = False,
+    report: bool = False,
+    motion: Path | None = None,
 ) -> None:
     """Write a hand of a given shape as URDF and MJCF, with meshes, masses, limits and collision shapes.
 
@@ -29,19 +32,35 @@ def build(
         side: which hand.
         mano: a licensed MANO file (MANO_RIGHT.pkl, MANO_LEFT.pkl or .npz); without it, the open hand.
         wrist_joints: put six movable joints between the world and the wrist.
+        report: measure how far the rigid links' skin lies from the blended skin, in postures from fist to spread
+            fingers: a table here, skin_error.csv and skin_error.png in the folder.
+        motion: a recording whose postures the report measures too.
     """
-    rigid = build_rigid_hand(load_hand(mano, side), np.array(shape))
-    with filling(out) as folder:  # both files or none
+    if motion is not None and not report:
+        raise InputError(f"--motion {motion} is measured by the report alone; give --report too")
+    hand = load_hand(mano, side)
+    rigid = build_rigid_hand(hand, np.array(shape))
+    measured = None
+    with filling(out) as folder:  # all files or none
         names = [
             write_urdf(rigid, folder, wrist_joints=wrist_joints).name,
             write_mjcf(rigid, folder, base="actuated" if wrist_joints else "fixed").name,
         ]
+        if report:
+            from mjx_hand.cli.skin_report import write_skin_report
+
+            measured = write_skin_report(folder, hand, np.array(shape), rigid, motion)
     rows = [
         (link, f"{mass * 1e3:.1f}", str(len(faces)), str(rigid.capsule_links.count(k)))
         for k, (link, mass, faces) in enumerate(zip(LINKS, rigid.link_mass, rigid.mesh_faces, strict=True))
     ]
     title = f"{rigid.name}, {rigid.side}: {len(LINKS)} links, {len(HINGES)} hinges, {rigid.link_mass.sum() * 1e3:.0f} g"
     print_table(title, ("link", "mass (g)", "triangles", "capsules"), rows)
+    if measured is not None:
+        from mjx_hand.cli.skin_report import PICTURE, TABLE, print_skin_report
+
+        print_skin_report(measured)
+        print(f"{out / PICTURE} shows where, {out / TABLE} has every link and posture")
     urdf, mjcf = (out / name for name in names)
     print(f"{urdf}  for PyBullet, Isaac, Drake, ROS: yourdfpy.URDF.load({str(urdf)!r})")
     print(f"{mjcf}  for MuJoCo and MJX: mujoco.MjModel.from_xml_path({str(mjcf)!r})")

@@ -1,5 +1,8 @@
 """`mjx-hand build`, called as a shell would, its files loaded by programs of others."""
 
+import csv
+
+import matplotlib.image as mpimg
 import mujoco
 import numpy as np
 import pytest
@@ -35,12 +38,38 @@ def test_summary_names_links_masses_and_how_to_load(tmp_path, capsys):
     assert mujoco.MjModel.from_xml_path(str(tmp_path / "left" / "left_hand.xml")).nq == 26
 
 
+def test_report_measures_the_skin(tmp_path, capsys):
+    assert main(["build", "--out", str(tmp_path / "hand"), "--shape", "1", "--report"]) == 0
+    out = capsys.readouterr().out
+    assert "skin on rigid links against blended skin (mm)" in out
+    with (tmp_path / "hand" / "skin_error.csv").open() as file:
+        rows = {(row["postures"], row["link"]): row for row in csv.DictReader(file)}
+    assert {link for _, link in rows} == {"all", *LINKS}
+    assert {"fist", "pinch", "spread", "mcp flexion"} <= {name for name, _ in rows}
+    fist = rows["fist", "all"]
+    assert 0.3 < float(fist["mean_mm"]) < float(fist["p95_mm"]) < float(fist["max_mm"])
+    assert f"{float(fist['mean_mm']):.2f}" in out
+    picture = mpimg.imread(tmp_path / "hand" / "skin_error.png")
+    assert picture.std() > 0.05
+
+
+def test_report_takes_a_recording(tmp_path, capsys, recordings):
+    motion = str(recordings / "dexmv_mustard" / "sequence.npz")
+    assert main(["build", "--out", str(tmp_path / "hand"), "--report", "--motion", motion]) == 0
+    assert "sequence.npz (122)" in capsys.readouterr().out
+    assert main(["build", "--out", str(tmp_path / "left"), "--side", "left", "--report", "--motion", motion]) == 2
+    assert "holds a right hand, but the hand built is a left one" in capsys.readouterr().err
+    assert not (tmp_path / "left").exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["--shape", "nan"], "every coefficient must be finite"),
         (["--shape", *["0"] * 40], "give a list of up to"),
         (["--mano", "gone.pkl"], "gone.pkl"),
+        (["--motion", "gone.npz"], "give --report too"),
+        (["--report", "--motion", "gone.npz"], "gone.npz"),
     ],
 )
 def test_input_at_fault_is_one_line_status_2_and_no_output(tmp_path, capsys, arguments, message):
