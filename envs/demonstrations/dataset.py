@@ -2,7 +2,8 @@
 
 A set is a folder of `train/NNN.npz` and `heldout/NNN.npz` (schema mjx-hand/demonstration/2). Beside each stand the
 motion that was fitted to its markers, `NNN.motion.npz` (which `mjx-hand retarget` reads), and its truth,
-`NNN.truth.npz`. Training and held-out demonstrations come from different people, object sizes and seeds.
+`NNN.truth.npz`; `yield.json` counts what came of all attempts. Training and held-out demonstrations come from different
+people, object sizes and seeds.
 """
 
 import dataclasses
@@ -10,7 +11,7 @@ import hashlib
 import json
 import shutil
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ from mjx_hand.rigid.build import build_rigid_hand
 from mjx_hand.rigid.rigid_hand import RigidHand
 
 PARTS = ("train", "heldout")
+YIELD = "yield.json"
 _VERSION = 2  # of the generator: a change that makes other demonstrations of the same settings raises it
 _SHAPE_LIMIT = 2.0  # standard deviations
 
@@ -84,8 +86,11 @@ def make_set(settings: SetSettings, root: str | Path, report: Report = lambda wh
         raise InputError(f"cannot write {folder}: {error.strerror}; choose another folder for demonstrations") from None
     try:
         parts = dict(zip(PARTS, (settings.people, settings.heldout_people), strict=True))
-        for offset, (part, people) in enumerate(parts.items()):
-            _make_part(settings, people, settings.seed + offset * 1_000_003, temporary / part, part, report)
+        yields = {
+            part: _make_part(settings, people, settings.seed + offset * 1_000_003, temporary / part, part, report)
+            for offset, (part, people) in enumerate(parts.items())
+        }
+        (temporary / YIELD).write_text(json.dumps(yields, indent=1))
         (temporary / "settings.json").write_text(json.dumps(dataclasses.asdict(settings), indent=1))
         temporary.chmod(0o755)
         try:
@@ -98,14 +103,17 @@ def make_set(settings: SetSettings, root: str | Path, report: Report = lambda wh
     return folder
 
 
-def _make_part(settings: SetSettings, people: int, seed: int, folder: Path, part: str, report: Report) -> None:
+def _make_part(
+    settings: SetSettings, people: int, seed: int, folder: Path, part: str, report: Report
+) -> Mapping[str, int]:
+    """Make one part; what came of its attempts."""
     model = load_hand()
     grasp = grasp_type(settings.grasp)
     rng = np.random.default_rng(seed)
     shapes = np.clip(rng.normal(size=(people, model.num_shape)), -_SHAPE_LIMIT, _SHAPE_LIMIT)
     hands = [build_rigid_hand(model, shape) for shape in shapes]
     wanted = people * settings.trials
-    trials = perform_trials(
+    trials, tally = perform_trials(
         grasp, hands, settings.trials, seed, lambda kept, tried: report(f"performing {part} grasps", kept / wanted)
     )
     recorded = record_trials(
@@ -123,6 +131,7 @@ def _make_part(settings: SetSettings, people: int, seed: int, folder: Path, part
         save_motion(motion, folder / f"{k:03d}.motion.npz")
         save_demonstration(demonstration, folder / f"{k:03d}.npz")
         save_truth(truth, folder / f"{k:03d}.truth.npz")
+    return tally
 
 
 def load_part(folder: str | Path, part: str) -> list[Demonstration]:

@@ -5,13 +5,15 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from mujoco import batch
 from scipy.spatial.transform import Rotation
 
 from envs.scene import NUM_WRIST, TIMESTEP
 from mjx_hand.hand.joints import NUM_HINGES
 
+# What can come of a script; the first is success.
+OUTCOMES = ("held", "diverged", "not lifted", "slipped", "turned in the hand")
 _RISE = 0.06  # m the object must rise
 _SLIP, _SLIP_TURN = 0.01, np.deg2rad(15.0)  # how far it may move in the hand after the lift
 
@@ -24,14 +26,19 @@ class Performance:
         angles: achieved hinge angles.
         wrist_position, wrist_rotation: achieved wrist pose (world_from_hand as a matrix).
         object_pose: position and quaternion.
-        held: lifted, and not slipped in the hand from the lift's end to the last frame.
+        outcome: index into `OUTCOMES` of the first thing that went wrong: the engine found a bad number; the object is
+            not lifted at the end; or it moved or turned in the hand between the lift's end and the last frame.
     """
 
     angles: Float[np.ndarray, "n t 20"]
     wrist_position: Float[np.ndarray, "n t 3"]
     wrist_rotation: Float[np.ndarray, "n t 3 3"]
     object_pose: Float[np.ndarray, "n t 7"]
-    held: Bool[np.ndarray, "n"]
+    outcome: Int[np.ndarray, "n"]
+
+    @property
+    def held(self) -> Bool[np.ndarray, "n"]:
+        return self.outcome == OUTCOMES.index("held")
 
 
 def perform(
@@ -66,17 +73,18 @@ def perform(
         wrist_position=position,
         wrist_rotation=rotation,
         object_pose=pose,
-        held=_held(rotation, position, pose, lifted_at) & ~diverged,
+        outcome=_outcomes(rotation, position, pose, lifted_at, diverged),
     )
 
 
-def _held(
+def _outcomes(
     rotation: Float[np.ndarray, "n t 3 3"],
     position: Float[np.ndarray, "n t 3"],
     pose: Float[np.ndarray, "n t 7"],
     lifted_at: Float[np.ndarray, "n"],
-) -> Bool[np.ndarray, "n"]:
-    """Whether each object rose, and stayed where it was in the hand after the lift."""
+    diverged: Bool[np.ndarray, "n"],
+) -> Int[np.ndarray, "n"]:
+    """See `Performance.outcome`."""
     rows = np.arange(len(pose))
     lifted = np.round(lifted_at / TIMESTEP).astype(int)
     rose = pose[:, -1, 2] - pose[:, 0, 2] > _RISE
@@ -88,4 +96,5 @@ def _held(
         return Rotation.from_matrix(rotation[rows, index]).inv() * quaternion
 
     turn = (orientation(lifted).inv() * orientation(np.full(len(pose), pose.shape[1] - 1))).magnitude()
-    return rose & (slip < _SLIP) & (turn < _SLIP_TURN)
+    wrong = np.stack([diverged, ~rose, slip >= _SLIP, turn >= _SLIP_TURN], axis=1)
+    return np.where(wrong.any(axis=1), 1 + np.argmax(wrong, axis=1), 0)

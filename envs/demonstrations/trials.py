@@ -1,7 +1,8 @@
 """Trials: random scripted grasps of a type, by several people, performed in the engine until enough succeed."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 
 import jax
 import jax.numpy as jnp
@@ -10,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from envs.demonstrations.perform import Performance, perform
+from envs.demonstrations.perform import OUTCOMES, Performance, perform
 from envs.demonstrations.posture import Posture, opened_angles, solve_postures, squeeze_angles
 from envs.demonstrations.script import GraspMotion, Tempo, scripted_targets
 from envs.grasps import GraspType
@@ -23,6 +24,7 @@ from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand
 
 _ROUNDS = 6  # batches of attempts before giving up
+NO_POSTURE, SPARE = "no posture found", "held, and not needed"
 _TOUCH_LIMIT = 0.002  # m: a posture whose contacts miss by more is not tried
 
 
@@ -50,8 +52,10 @@ def perform_trials(
     per_person: int,
     seed: int,
     report: Callable[[int, int], None] = lambda kept, tried: None,
-) -> list[Trial]:
-    """`per_person` successful trials of each hand, in the order of the hands.
+) -> tuple[list[Trial], Mapping[str, int]]:
+    """`per_person` successful trials of each hand, in the order of the hands; and what came of all attempts.
+
+    The second part counts attempts by outcome: `perform.OUTCOMES`, `NO_POSTURE` and `SPARE`.
 
     Args:
         grasp: the type.
@@ -66,6 +70,7 @@ def perform_trials(
     rng = np.random.default_rng(seed)
     kept: dict[int, list[Trial]] = {person: [] for person in range(len(hands))}
     tried = 0
+    tally: Counter[str] = Counter()
     for _ in range(_ROUNDS):
         missing = [p for p, trials in kept.items() for _ in range(per_person - len(trials))]
         if not missing:
@@ -73,30 +78,39 @@ def perform_trials(
         # A fixed batch size, so that the posture solver compiles once: fill up with spare attempts of the same people.
         size = -(-len(hands) * per_person * 5 // 4)
         people = [missing[k % len(missing)] for k in range(size)]
-        for trial in _attempt(grasp, [hands[p] for p in people], people, rng):
+        held, outcomes = _attempt(grasp, [hands[p] for p in people], people, rng)
+        tally.update(outcomes)
+        for trial in held:
             if len(kept[trial.person]) < per_person:
                 kept[trial.person].append(trial)
+            else:
+                tally.update({OUTCOMES[0]: -1, SPARE: 1})
         tried += size
         report(sum(map(len, kept.values())), tried)
     short = [p for p, trials in kept.items() if len(trials) < per_person]
     if short:
         raise InputError(
-            f"grasp {grasp.name!r}: hands {short} held fewer than {per_person} objects in {tried} attempts; "
-            "use other shapes, smaller objects, or mend the type's posture"
+            f"grasp {grasp.name!r}: hands {short} held fewer than {per_person} objects in {tried} attempts "
+            f"({_told(tally)}); use other shapes, smaller objects, or mend the type's posture"
         )
-    return [trial for trials in kept.values() for trial in trials]
+    return [trial for trials in kept.values() for trial in trials], tally
+
+
+def _told(tally: Mapping[str, int]) -> str:
+    return ", ".join(f"{outcome} {count}" for outcome, count in tally.items() if count)
 
 
 def _attempt(
     grasp: GraspType, hands: Sequence[RigidHand], people: Sequence[int], rng: np.random.Generator
-) -> list[Trial]:
-    """One batch of random trials; those that held."""
+) -> tuple[list[Trial], list[str]]:
+    """One batch of random trials: those that held, and what came of each."""
     things = [_draw_object(grasp, rng) for _ in hands]
     solved = solve_postures(grasp, hands, np.stack([thing.size for thing in things]))
     postures = [jax.tree.map(lambda leaf, k=k: np.asarray(leaf[k], float), solved) for k in range(len(hands))]
     good = [k for k, posture in enumerate(postures) if posture.touch_error < _TOUCH_LIMIT]
+    unsolved = [NO_POSTURE] * (len(hands) - len(good))
     if not good:
-        return []
+        return [], unsolved
     gains = Gains()
     motions, models, starts = [], [], []
     lying = np.array(grasp.object_rotation)
@@ -115,7 +129,8 @@ def _attempt(
         np.stack(starts),
         np.array([motion.tempo.end("lift") for motion in motions]),
     )
-    return [_trial(done, row, people[k], things[k], motions[row].tempo) for row, k in enumerate(good) if done.held[row]]
+    held = [_trial(done, row, people[k], things[k], motions[row].tempo) for row, k in enumerate(good) if done.held[row]]
+    return held, unsolved + [OUTCOMES[k] for k in done.outcome]
 
 
 def support_boxes(grasp: GraspType) -> tuple[Float[np.ndarray, "b 3"], Float[np.ndarray, "b 3"]]:
