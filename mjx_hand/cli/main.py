@@ -7,17 +7,19 @@ import tyro
 
 from mjx_hand.cli.build import build
 from mjx_hand.cli.fit import fit
+from mjx_hand.cli.info import info
 from mjx_hand.cli.keypoints import keypoints
 from mjx_hand.cli.retarget import retarget
 from mjx_hand.cli.view import view
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 
-COMMANDS = {"build": build, "fit": fit, "keypoints": keypoints, "retarget": retarget, "view": view}
+COMMANDS = {"build": build, "fit": fit, "info": info, "keypoints": keypoints, "retarget": retarget, "view": view}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a subcommand; returns the exit status: 0, or 2 for input that cannot be used (one line on standard error).
+    """Run a subcommand; returns the exit status: 0, 2 for input that cannot be used (one line on standard error), 1 where
+    the subcommand says that some of its input could not be.
 
     Args:
         argv: the arguments; the process's own if None.
@@ -27,8 +29,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     try:
         enable_compile_cache()
-        tyro.extras.subcommand_cli_from_dict(COMMANDS, prog="mjx-hand", args=argv)
+        status = tyro.extras.subcommand_cli_from_dict(COMMANDS, prog="mjx-hand", args=argv)
     except InputError as error:
         print(f"mjx-hand: {error}", file=sys.stderr)
         return 2
-    return 0
+    return status or 0

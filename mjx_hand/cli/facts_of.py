@@ -1,0 +1,191 @@
+"""What is in each kind of file, as labels and texts for people."""
+
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+
+from mjx_hand.capture.keypoints.layouts import KEYPOINTS
+from mjx_hand.capture.keypoints.load import chosen, keypoint_contents, recognised
+from mjx_hand.capture.keypoints.recording import KeypointRecording
+from mjx_hand.capture.keypoints.side import known_side
+from mjx_hand.capture.labels import match_labels
+from mjx_hand.capture.load_markers import load_markers
+from mjx_hand.capture.marker_set import INCLUDED, included_marker_set
+from mjx_hand.errors import InputError
+from mjx_hand.hand.load import load_hand
+from mjx_hand.hand.mano_file import load_mano_file
+from mjx_hand.motion import Demonstration, JointMotion, Motion
+
+Facts = tuple[tuple[str, str], ...]
+
+
+def motion(found: Motion) -> Facts:
+    """Of a motion."""
+    return (
+        ("hand", f"{found.side}, {len(found.shape)} shape coefficients{_own_joints(found)}"),
+        _frames(found.num_frames, found.fps),
+        ("gaps", _share(~found.valid)),
+        ("units", "metres, radians, seconds; quaternions wxyz"),
+        ("wrist", _travel(found.wrist_position[found.valid])),
+        ("source", found.source or "not said"),
+    )
+
+
+def joint_motion(found: JointMotion) -> Facts:
+    """Of a joint motion."""
+    return (
+        ("hand", f"{found.side}, {found.angles.shape[1]} hinges"),
+        _frames(found.num_frames, found.fps),
+        ("gaps", f"{_share(~found.valid)}{', interpolated' if not found.valid.all() else ''}"),
+        ("units", "radians, metres, seconds; quaternions wxyz"),
+        ("wrist", _travel(found.wrist_position)),
+        ("source", found.source or "not said"),
+    )
+
+
+def demonstration(found: Demonstration) -> Facts:
+    """Of a demonstration."""
+    thing = found.object
+    size = " x ".join(f"{1e3 * s:.0f}" for s in thing.size if s > 0)
+    return (
+        ("grasp", found.grasp),
+        ("object", f"{thing.kind}, {size} mm (half extents or radius), {1e3 * thing.mass:.0f} g"),
+        *joint_motion(found.motion),
+    )
+
+
+def keypoints(path: Path, side: str | None, sequence: str | None, fps: float | None) -> tuple[str, Facts, str]:
+    """Of a keypoint file: its form, what is in it, and the options that choose the hand that is described."""
+    contents = keypoint_contents(path)
+    reader = recognised(path, contents)
+    assert reader is not None, "the caller has looked"
+    hands = reader.read(path, contents, None)
+    names = ("hands", ", ".join(f"{name} ({hand.num_frames} frames)" for name, hand in hands.items()))
+    try:
+        found = chosen(path, hands, side, sequence)
+    except InputError as error:
+        return reader.name, (names, ("to read one", str(error).removeprefix(f"{path}: "))), " --sequence NAME"
+    said = {"side": side, "sequence": sequence, "fps": fps}
+    choice = "".join(f" --{name} {value}" for name, value in said.items() if value is not None)
+    try:
+        which = " ".join(f"({text})" if k else text for k, text in enumerate(known_side(found, side)))
+    except InputError as error:
+        which, choice = str(error).removeprefix(f"{found.source}: "), f"{choice} --side right"
+    rate = found.fps or fps
+    if rate is None:
+        choice += " --fps 30"
+    frames = (
+        _frames(found.num_frames, rate)
+        if rate
+        else ("frames", f"{found.num_frames}, at a rate that the file does not say")
+    )
+    return reader.name, (names, ("side", which), frames, *_points(found)), choice
+
+
+def _points(found: KeypointRecording) -> Facts:
+    seen = np.asarray(np.isfinite(found.positions).all(axis=-1))
+    never = [KEYPOINTS[k] for k in np.flatnonzero(~seen.any(axis=0))]
+    lacks = f", never {', '.join(never)}" if never else ""
+    extent = np.nanmax(found.positions, axis=(0, 1)) - np.nanmin(found.positions, axis=(0, 1))
+    return (
+        ("keypoints", f"{21 - len(never)} of 21, layout {found.layout}{lacks}"),
+        ("gaps", _share(~seen[:, seen.any(axis=0)])),
+        ("units", "metres, as the file's own unit says"),
+        ("extent", f"{' x '.join(f'{e:.3g}' for e in extent)} m over all frames"),
+    )
+
+
+def markers(path: Path) -> tuple[Facts, str]:
+    """Of a marker recording: what is in it, and the marker set that suits it best."""
+    found = load_markers(path)
+    hand = load_hand()
+    counts = {}
+    for name in INCLUDED:
+        marker_set = included_marker_set(hand, name)
+        try:
+            counts[name] = len(match_labels(found, marker_set).recording.names) / len(marker_set.names)
+        except InputError:  # none of its labels, or two hands
+            counts[name] = 0.0
+    best = max(counts, key=lambda name: counts[name])
+    missing = 1 - found.visible.mean(axis=0)
+    worst = np.argsort(-missing)[:3]
+    holes = ", ".join(f"{found.names[m]} {100 * missing[m]:.1f} %" for m in worst if missing[m] > 0)
+    suits = (
+        f"{best}, of whose markers it has {100 * counts[best]:.0f} %"
+        if counts[best]
+        else "none of " + ", ".join(INCLUDED)
+    )
+    at = found.positions[found.visible]
+    extent = np.ptp(at, axis=0) if len(at) else np.zeros(3)
+    return (
+        ("markers", f"{len(found.names)}: {', '.join(found.names)}"),
+        _frames(found.num_frames, found.fps),
+        ("gaps", _share(~found.visible) + (f" (most: {holes})" if holes else "")),
+        ("units", "metres, as the file's own unit says"),
+        ("extent", f"{' x '.join(f'{e:.3g}' for e in extent)} m over all frames"),
+        ("marker set", suits),
+    ), best if counts[best] else "MARKER_SET.yaml"
+
+
+def mano(path: Path) -> tuple[str, Facts]:
+    """Of a MANO file: its side, and what is in it.
+
+    Raises:
+        InputError: it cannot be used for either side.
+    """
+    side = "right"
+    try:
+        hand = load_mano_file(path, side)
+    except InputError as error:
+        if "holds a left hand" not in str(error):
+            raise
+        side = "left"
+        hand = load_mano_file(path, side)
+    return side, (
+        (
+            "hand",
+            f"{side}, {hand.num_vertices} vertices, {len(hand.faces)} triangles, {hand.num_shape} shape components",
+        ),
+        ("units", "metres, flat hand at rest; poses of this file are relative to its hands_mean where so recorded"),
+    )
+
+
+def robot(path: Path) -> tuple[str, Facts]:
+    """Of a URDF or MJCF: which it is, and how many links and movable joints it has.
+
+    Raises:
+        InputError: it is not XML, or of another kind.
+    """
+    try:
+        root = ElementTree.parse(path).getroot()
+    except (ElementTree.ParseError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not readable XML ({error}); export it again") from None
+    if root.tag == "robot":
+        movable = [j for j in root.iter("joint") if j.get("type") not in (None, "fixed")]
+        facts = ("links", str(len(root.findall("link")))), ("joints", f"{len(movable)} that move")
+        return f"URDF of the robot {root.get('name', 'without a name')!r}", facts
+    if root.tag == "mujoco":
+        bodies, joints = sum(1 for _ in root.iter("body")), sum(1 for _ in root.iter("joint"))
+        return f"MJCF of the model {root.get('model', 'without a name')!r}", (
+            ("bodies", str(bodies)),
+            ("joints", str(joints)),
+        )
+    raise InputError(f"{path}: XML of {root.tag!r}, neither a URDF (robot) nor an MJCF (mujoco)")
+
+
+def _frames(count: int, fps: float) -> tuple[str, str]:
+    return "frames", f"{count} at {fps:g}/s ({count / fps:.1f} s)"
+
+
+def _share(missing: np.ndarray) -> str:
+    return f"{100 * missing.mean():.1f} %" if missing.any() else "none"
+
+
+def _travel(positions: np.ndarray) -> str:
+    span = np.ptp(positions, axis=0)
+    return f"moves within {' x '.join(f'{1e3 * s:.0f}' for s in span)} mm"
+
+
+def _own_joints(found: Motion) -> str:
+    return ", the subject's own joint centres" if found.link_offset is not None else ""

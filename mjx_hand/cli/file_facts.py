@@ -1,0 +1,147 @@
+"""What is known of a file, for people: its kind, its facts, and the commands that take it further."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from mjx_hand.capture.datasets.contents import read_contents
+from mjx_hand.capture.datasets.dataset_format import dataset_formats
+from mjx_hand.capture.datasets.keypoints import FORMAT as KEYPOINTS
+from mjx_hand.capture.keypoints.load import is_keypoint_file
+from mjx_hand.capture.load import load_motion
+from mjx_hand.capture.marker_files.marker_format import marker_formats
+from mjx_hand.capture.recording import SCHEMA as MARKERS
+from mjx_hand.cli import facts_of
+from mjx_hand.errors import InputError
+from mjx_hand.motion import load_demonstration, load_joint_motion
+from mjx_hand.motion.archive import schema_of
+from mjx_hand.motion.demonstration import SCHEMA as DEMONSTRATION
+from mjx_hand.motion.joint_motion import SCHEMA as JOINT_MOTION
+
+VIDEOS = (".mp4", ".mov", ".avi", ".webm", ".mkv")
+_MANO_KEYS = {"v_template", "J_regressor", "kintree_table"}
+
+
+@dataclass(frozen=True)
+class FileFacts:
+    """What is known of a file.
+
+    Attributes:
+        kind: what it is, in a few words.
+        facts: what and how much is in it, label and text.
+        next: commands that take it further.
+    """
+
+    kind: str
+    facts: tuple[tuple[str, str], ...]
+    next: tuple[str, ...] = ()
+
+
+def file_facts(
+    path: Path, side: str | None = None, sequence: str | None = None, mano: Path | None = None, fps: float | None = None
+) -> FileFacts:
+    """What a file or folder is, what is in it and what to do with it.
+
+    Args:
+        path: of the file or folder.
+        side, sequence, mano, fps: as `load_motion` takes them, where the recording leaves a choice.
+
+    Raises:
+        InputError: there is no such file, it is damaged, or nothing here reads it.
+    """
+    if not path.exists():
+        raise InputError(f"{path}: no such file; give the path of a recording, a hand or a robot description")
+    if path.is_file() and path.stat().st_size == 0:
+        raise InputError(f"{path}: the file is empty; copy or export it again")
+    return (
+        _own(path)
+        or _robot(path)
+        or _keypoints(path, side, sequence, fps)
+        or _motion(path, side, sequence, mano, fps)
+        or _mano(path)
+        or _markers(path)
+        or _video(path)
+        or _unknown(path)
+    )
+
+
+def _own(path: Path) -> FileFacts | None:
+    """Joint motions and demonstrations; motions, markers and keypoints are found among the recordings."""
+    schema = schema_of(path)
+    out = path.with_suffix("")
+    if schema == JOINT_MOTION:
+        facts = facts_of.joint_motion(load_joint_motion(path))
+        return FileFacts(f"joint motion ({schema})", facts, (f"mjx-hand view {path}",))
+    if schema == DEMONSTRATION:
+        facts = facts_of.demonstration(load_demonstration(path))
+        return FileFacts(f"demonstration ({schema})", facts, (f"mjx-hand view {path}",))
+    if schema == MARKERS:
+        return _marker_facts(path, f"markers ({schema})", out)
+    return None
+
+
+def _robot(path: Path) -> FileFacts | None:
+    if path.suffix.lower() not in (".urdf", ".xml"):
+        return None
+    kind, facts = facts_of.robot(path)
+    load = "yourdfpy.URDF.load" if kind.startswith("URDF") else "mujoco.MjModel.from_xml_path"
+    return FileFacts(kind, facts, (f"in Python: {load}({str(path)!r})",))
+
+
+def _keypoints(path: Path, side: str | None, sequence: str | None, fps: float | None) -> FileFacts | None:
+    if not path.is_file() or not is_keypoint_file(path):
+        return None
+    form, facts, choice = facts_of.keypoints(path, side, sequence, fps)
+    out = path.with_suffix("").name
+    commands = (f"mjx-hand view {path}{choice}", f"mjx-hand keypoints {path} --out {out}.motion.npz{choice}")
+    return FileFacts(form, facts, commands)
+
+
+def _motion(
+    path: Path, side: str | None, sequence: str | None, mano: Path | None, fps: float | None
+) -> FileFacts | None:
+    contents = read_contents(path)
+    known = next((f for f in dataset_formats() if f is not KEYPOINTS and f.recognises(path, contents)), None)
+    if known is None:
+        return None
+    said = {"side": side, "sequence": sequence, "mano": mano, "fps": fps}
+    choice = "".join(f" --{name} {value}" for name, value in said.items() if value is not None)
+    try:
+        motion = load_motion(path, side=side, sequence=sequence, mano=mano, fps=fps)
+    except InputError as error:
+        # Of a known format, but it takes a choice to read it, or it is not sound: its own line says which.
+        return FileFacts(known.name, (("to read it", str(error).removeprefix(f"{path}: ")),))
+    commands = (f"mjx-hand view {path}{choice}", f"mjx-hand retarget {path} --out angles.npz{choice}")
+    return FileFacts(known.name, facts_of.motion(motion), commands)
+
+
+def _mano(path: Path) -> FileFacts | None:
+    values = read_contents(path)
+    if not set(values) >= _MANO_KEYS:
+        return None
+    side, facts = facts_of.mano(path)
+    return FileFacts("MANO hand", facts, (f"mjx-hand build --out my_hand --side {side} --mano {path}",))
+
+
+def _markers(path: Path) -> FileFacts | None:
+    known = next((f for f in marker_formats() if path.suffix.lower() in f.suffixes and path.suffix != ".npz"), None)
+    return None if known is None or not path.is_file() else _marker_facts(path, known.name, path.with_suffix(""))
+
+
+def _marker_facts(path: Path, kind: str, out: Path) -> FileFacts:
+    facts, marker_set = facts_of.markers(path)
+    return FileFacts(kind, facts, (f"mjx-hand fit {path} --markers {marker_set} --out {out.name}.motion.npz",))
+
+
+def _video(path: Path) -> FileFacts | None:
+    if path.suffix.lower() not in VIDEOS:
+        return None
+    return FileFacts(
+        "video", (("to read it", "a tracker's keypoints are needed, such as MediaPipe's world landmarks"),)
+    )
+
+
+def _unknown(path: Path) -> FileFacts:
+    names = [f.name for f in (*dataset_formats(), *marker_formats())]
+    names += ["joint motion", "demonstration", "MANO", "URDF", "MJCF"]
+    short = dict.fromkeys(name.split(" (")[0] for name in names)
+    raise InputError(f"{path}: nothing that is known here; known are {', '.join(short)}")

@@ -1,0 +1,33 @@
+"""`mjx-hand info`: what a file is, what is in it, and what to run next."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from mjx_hand.cli.file_facts import file_facts
+
+
+def info(
+    file: Annotated[Path, tyro.conf.Positional],
+    side: Literal["right", "left"] | None = None,
+    sequence: str | None = None,
+    mano: Path | None = None,
+    fps: float | None = None,
+) -> None:
+    """Say what a file or dataset folder is, what it holds, and what to run next.
+
+    Args:
+        file: anything that mjx-hand reads or writes.
+        side: which hand to describe, where there are both.
+        sequence: which recording to describe, where there are several.
+        mano: a licensed MANO file, for datasets whose poses need one.
+        fps: frames a second, where the recording does not say.
+    """
+    found = file_facts(file, side, sequence, mano, fps)
+    print(f"{file}: {found.kind}")
+    width = max((len(label) for label, _ in found.facts), default=0)
+    for label, text in found.facts:
+        print(f"  {label:<{width}}  {text}")
+    for command in found.next:
+        print(f"next: {command}")
