@@ -1,18 +1,24 @@
+import pickle
+from pathlib import Path
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from body_models.mano.numpy import MANO
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.sparse import csc_matrix
 from scipy.spatial.transform import Rotation
 
 from mjx_hand.hand.joints import PARENTS
+from mjx_hand.hand.load import load_hand
 from mjx_hand.hand.model import HandModel
 from mjx_hand.hand.open_hand import load_open_hand
 from mjx_hand.hand.skinning import joint_centres, shaped_template, skin
 from mjx_hand.pytree import replace
 
-from .mano_layout import write_npz
+from .mano_layout import layout, write_npz
 
 V = 60  # a thinned hand: the arithmetic is the same and the oracle's loops stay quick
 
@@ -74,17 +80,53 @@ def test_skin_equals_the_loops(correctives: bool, seed: int) -> None:
 
 
 @pytest.mark.filterwarnings("ignore")  # the oracle's own
-def test_skin_equals_another_implementation_of_mano(tmp_path) -> None:
-    mano = pytest.importorskip("body_models.mano.numpy", reason="body-models is not installed").MANO
-    hand = load_open_hand()
+@pytest.mark.parametrize("form", ["npz", "pkl"])
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_skin_equals_another_implementation_of_mano(tmp_path: Path, side: str, form: str) -> None:
+    """The same file through body-models and through `load_hand`: random shapes and poses, pose correctives included."""
     rng = np.random.default_rng(5)
-    hand = replace(hand, posedirs=rng.normal(scale=1e-3, size=hand.posedirs.shape).astype(np.float32))
-    model = mano(model_path=write_npz(hand, tmp_path / "MANO_RIGHT.npz"), rotation_type="rotmat")
+    made = load_open_hand(side)
+    correctives = rng.normal(scale=1e-3, size=made.posedirs.shape).astype(np.float32)
+    made = replace(made, posedirs=correctives, pose_mean=rng.normal(scale=0.2, size=(15, 3)).astype(np.float32))
+    path = tmp_path / f"MANO_{side.upper()}.{form}"
+    if form == "npz":
+        write_npz(made, path)
+    else:
+        path.write_bytes(pickle.dumps(layout(made) | {"J_regressor": csc_matrix(layout(made)["J_regressor"])}))
+    hand = load_hand(path, side)
+    oracle = MANO(model_path=path, flat_hand_mean=True, rotation_type="rotmat")
     rotations = Rotation.random(60, rng=rng).as_matrix().astype(np.float32).reshape(4, 15, 3, 3)
     shape = rng.normal(size=(4, 10)).astype(np.float32)
     vertices, joints = skin(hand, jnp.asarray(rotations), jnp.asarray(shape))
-    np.testing.assert_allclose(vertices, model.forward_vertices(rotations, shape=shape), atol=5e-6)
-    np.testing.assert_allclose(joints, model.forward_skeleton(rotations, shape=shape)[..., :3, 3], atol=5e-6)
+    np.testing.assert_allclose(vertices, oracle.forward_vertices(rotations, shape=shape), atol=1e-5)
+    np.testing.assert_allclose(joints, oracle.forward_skeleton(rotations, shape=shape)[..., :3, 3], atol=1e-5)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_official_left_file_is_given_its_own_shape_directions(tmp_path: Path) -> None:
+    """The official left file has the right hand's: the oracle gets a mended file, `load_hand` mends it itself."""
+    rng = np.random.default_rng(6)
+    left = load_open_hand("left")
+    official = write_npz(left, tmp_path / "MANO_LEFT.npz", shapedirs=load_open_hand().shapedirs)
+    oracle = MANO(model_path=write_npz(left, tmp_path / "mended.npz"), flat_hand_mean=True, rotation_type="rotmat")
+    rotations = Rotation.random(15, rng=rng).as_matrix().astype(np.float32)[None]
+    shape = rng.normal(size=(1, 10)).astype(np.float32)
+    vertices, _ = skin(load_hand(official, "left"), jnp.asarray(rotations), jnp.asarray(shape))
+    np.testing.assert_allclose(vertices, oracle.forward_vertices(rotations, shape=shape), atol=1e-5)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_pose_mean_is_the_one_that_others_add(tmp_path: Path) -> None:
+    """A pose that is relative to `hands_mean`, as recordings of MANO give it, has `pose_mean` added by the caller."""
+    rng = np.random.default_rng(7)
+    made = replace(load_open_hand(), pose_mean=rng.normal(scale=0.2, size=(15, 3)).astype(np.float32))
+    path = write_npz(made, tmp_path / "MANO_RIGHT.npz")
+    hand = load_hand(path)
+    oracle = MANO(model_path=path, flat_hand_mean=False)
+    pose = rng.normal(scale=0.3, size=(1, 15, 3)).astype(np.float32)
+    turns = Rotation.from_rotvec(pose[0] + hand.pose_mean).as_matrix().astype(np.float32)[None]
+    vertices, _ = skin(hand, jnp.asarray(turns), jnp.zeros((1, 10)))
+    np.testing.assert_allclose(vertices, oracle.forward_vertices(pose, shape=np.zeros((1, 10), np.float32)), atol=1e-5)
 
 
 def test_rest_pose_is_the_shaped_template_and_its_joints() -> None:
