@@ -18,8 +18,9 @@ COMMANDS = {"build": build, "fit": fit, "info": info, "keypoints": keypoints, "r
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a subcommand; returns the exit status: 0, 2 for input that cannot be used (one line on standard error), 1 where
-    the subcommand says that some of its input could not be.
+    """Run a subcommand; returns the exit status.
+
+    0; 2 for input that cannot be used (one line on standard error); 1 where a subcommand did the rest of its input.
 
     Args:
         argv: the arguments; the process's own if None.

@@ -62,11 +62,13 @@ def errors_of(
 
 
 def hand_table(hands: Sequence[RigidHand]) -> RigidHand:
-    """At most `HANDS` hands as one table of that many rows, the first repeated; its name and meshes left out."""
+    """At most `HANDS` hands as one table of that many rows, the first repeated; its shapes left out."""
     if any(hand.rest_rotation is not None for hand in hands):  # all or none, as the table is one array
         flat = np.tile(np.eye(3), (15, 1, 1))
         hands = [hand if hand.rest_rotation is not None else replace(hand, rest_rotation=flat) for hand in hands]
-    bare = [replace(hand, name="") for hand in hands]
+    plain = {"name": "", "side": "right", "capsule_links": (0,)}  # what kinematics does not need, alike for all
+    plain |= {"capsule_ends": np.zeros((1, 2, 3)), "capsule_radius": np.ones(1)}
+    bare = [replace(hand, **plain) for hand in hands]
     return stack_hands([*bare, *[bare[0]] * (HANDS - len(bare))])
 
 
