@@ -1,5 +1,6 @@
 """Calibration files beside a recording: YAML or JSON with shape coefficients and camera transforms."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,12 @@ from mjx_hand.errors import InputError
 from mjx_hand.motion.layout import numbers
 
 
-def read_settings(path: Path, needed: tuple[str, ...]) -> dict[str, Any]:
+def read_settings(path: Path, needed: Mapping[str, type]) -> dict[str, Any]:
     """The dictionary in a YAML (or JSON) file beside a recording.
+
+    Args:
+        path: of the file.
+        needed: the names that it must have, and of what type; a list must have entries.
 
     Raises:
         InputError: it is missing, is not one, or lacks what is needed.
@@ -26,6 +31,9 @@ def read_settings(path: Path, needed: tuple[str, ...]) -> dict[str, Any]:
     missing = [name for name in needed if not isinstance(found, dict) or name not in found]
     if missing:
         raise InputError(f"{path}: has no {missing[0]!r}; it needs {', '.join(needed)}")
+    for name, kind in needed.items():
+        if not isinstance(found[name], kind) or (kind is list and not found[name]):
+            raise InputError(f"{path}: {name} is {found[name]!r}, expected a {kind.__name__}"[:300])
     return found
 
 
@@ -35,7 +43,7 @@ def betas(path: Path) -> Float[np.ndarray, "10"]:
     Raises:
         InputError: the file is missing or has no ten numbers.
     """
-    return numbers(path, {"betas": _listed(read_settings(path, ("betas",))["betas"])}, {"betas": (10,)})["betas"]
+    return numbers(path, {"betas": _listed(read_settings(path, {"betas": list})["betas"])}, {"betas": (10,)})["betas"]
 
 
 def transform(path: Path, name: str) -> Float[np.ndarray, "3 4"]:
@@ -44,8 +52,8 @@ def transform(path: Path, name: str) -> Float[np.ndarray, "3 4"]:
     Raises:
         InputError: it is missing, or not such a transform.
     """
-    found = read_settings(path, ("extrinsics",))["extrinsics"]
-    given = {name: _listed(found[name]).reshape(-1)} if isinstance(found, dict) and name in found else {}
+    found = read_settings(path, {"extrinsics": dict})["extrinsics"]
+    given = {name: _listed(found[name]).reshape(-1)} if name in found else {}
     matrix = numbers(path, given, {name: (12,)})[name].reshape(3, 4).astype(float)
     if np.abs(matrix[:, :3] @ matrix[:, :3].T - np.eye(3)).max() > 1e-3:
         raise InputError(f"{path}: {name} is not a rigid transform; get the calibration again")

@@ -46,6 +46,14 @@ def _rows(contents: Contents) -> list[Any]:
     return hands if isinstance(hands, list) else [dict(contents)]
 
 
+def _listed(path: Path, meta: dict[str, Any], name: str) -> list[Any]:
+    """What the row says of each hand under that name; nothing where it does not."""
+    value = unwrapped(meta.get(name))
+    if value is None or isinstance(value, list | tuple):
+        return list(value or ())
+    return list(np.atleast_1d(plain(path, name, value)))
+
+
 def _recognises(path: Path, contents: Contents) -> bool:
     return any(_is_hand(fields) for fields in _rows(contents))
 
@@ -54,7 +62,7 @@ def _hands(path: Path, contents: Contents, request: Request) -> dict[str, dict[s
     """The hands by side, each with its shape."""
     meta = unwrapped(contents.get("trajectory_metadata"))
     meta = meta if isinstance(meta, dict) else {}
-    names, shapes = (list(unwrapped(meta.get(key)) or []) for key in ("hand_names", "mano_hand_shapes"))
+    names, shapes = _listed(path, meta, "hand_names"), _listed(path, meta, "mano_hand_shapes")
     hands = {}
     for k, fields in enumerate(_rows(contents)):
         if not _is_hand(fields):

@@ -19,6 +19,7 @@ from jaxtyping import Bool, Float
 from scipy.spatial.transform import Rotation
 
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
+from mjx_hand.capture.datasets.joint_places import offsets_in_parents
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import FINGERS, LINKS, PARENTS, TIP_LINKS
 from mjx_hand.motion import Motion, check_motion
@@ -37,11 +38,7 @@ def _recognises(path: Path, arrays: Contents) -> bool:
 
 def link_offsets_by_frame(transforms: Float[np.ndarray, "t 16 4 4"]) -> Float[np.ndarray, "t 16 3"]:
     """Each joint's centre in its parent's frame (m), from global transforms in the order of `LINKS`; wrist zero."""
-    parents = transforms[:, list(PARENTS[1:])]
-    step = transforms[:, 1:, :3, 3] - parents[..., :3, 3]
-    offsets = np.zeros((len(transforms), len(LINKS), 3))
-    offsets[:, 1:] = np.einsum("tlji,tlj->tli", parents[..., :3, :3], step)
-    return offsets
+    return offsets_in_parents(transforms[..., :3, :3], transforms[..., :3, 3])
 
 
 def ordered_transforms(path: Path, arrays: Contents) -> Float[np.ndarray, "t 16 4 4"]:

@@ -31,7 +31,8 @@ def _recognises(path: Path, contents: Contents) -> bool:
 
 
 def _read(path: Path, contents: Contents, request: Request) -> Motion:
-    meta = read_settings(path / "meta.yml", ("num_frames", "mano_sides", "mano_calib", "extrinsics"))
+    needed = {"num_frames": int, "mano_sides": list, "mano_calib": list, "extrinsics": str}
+    meta = read_settings(path / "meta.yml", needed)
     side = chosen_side(path, meta["mano_sides"], request)
     calibration = path.absolute().parent.parent / "calibration"
     shape = betas(calibration / f"mano_{meta['mano_calib'][0]}" / "mano.yml")

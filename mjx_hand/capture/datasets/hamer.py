@@ -83,6 +83,7 @@ def _hands(where: str, entry: Any) -> list[_Hand]:
         raise InputError(f"{where}: holds no {', '.join(_PARAMETERS)}; save the model's own output")
     right = plain(where, "right", values.get("right", values.get("is_right")))
     count = right.size
+    right = numbers(where, {"right": right.reshape(count)}, {"right": (count,)})["right"]
     found = _found(where, values)
     layout = {"global_orient": (count, 1, 3, 3), "hand_pose": (count, 15, 3, 3)}
     rotations = np.concatenate(list(numbers(where, found, layout, finite=False).values()), axis=1).astype(float)
@@ -92,7 +93,9 @@ def _hands(where: str, entry: Any) -> list[_Hand]:
 
 
 def _mini(where: str, entry: dict[str, Any]) -> list[_Hand]:
-    right = plain(where, "is_right", entry["is_right"]).reshape(1)
+    right = plain(where, "is_right", entry["is_right"])
+    if right.size != 1 or right.dtype.kind not in "fiub":
+        raise InputError(f"{where}: is_right is no single number")
     found = _found(where, entry["wilor_preds"])
     layout = {"global_orient": (1, 1, 3), "hand_pose": (1, 15, 3)}
     vectors = np.concatenate(list(numbers(where, found, layout, finite=False).values()), axis=1).astype(float)

@@ -48,7 +48,7 @@ def _calibration(path: Path, meta: dict) -> Path:
 
 
 def _read(path: Path, contents: Contents, request: Request) -> Motion:
-    meta = read_settings(_meta(path), ("mano_sides", "num_frames"))
+    meta = read_settings(_meta(path), {"mano_sides": list, "num_frames": int})
     side = chosen_side(path, meta["mano_sides"], request)
     whole = {"poses_m": plain(path, "poses_m.npy", read_contents(path / "poses_m.npy").get(WHOLE))}
     poses = numbers(path, whole, {"poses_m": (2, meta["num_frames"], 51)}, finite=False)["poses_m"].astype(float)

@@ -16,6 +16,14 @@ Array = np.ndarray
 _AGREEMENT = 0.01
 
 
+def offsets_in_parents(turned: Float[Array, "t 16 3 3"], places: Float[Array, "t 16 3"]) -> Float[Array, "t 16 3"]:
+    """Each joint's centre in its parent's frame (m), from all links' rotations and joints; the wrist's is zero."""
+    offsets = np.zeros((len(places), NUM_LINKS, 3))
+    parents = list(PARENTS[1:])
+    offsets[:, 1:] = np.einsum("tlji,tlj->tli", turned[:, parents], places[:, 1:] - places[:, parents])
+    return offsets
+
+
 def subject_with_joints(
     path: Path,
     shape: Float[Array, "s"],
@@ -40,11 +48,10 @@ def subject_with_joints(
     """
     places = joints[:, list(LINK_KEYPOINTS)]
     turned = [orientation]
-    offsets = np.zeros((len(joints), NUM_LINKS, 3))
+    for link, parent in enumerate(PARENTS[1:]):
+        turned.append(turned[parent] @ rotations[:, link])
+    offsets = offsets_in_parents(np.stack(turned, axis=1), places)
     offsets[:, 0] = places[:, 0]
-    for link, parent in enumerate(PARENTS[1:], start=1):
-        offsets[:, link] = np.einsum("tji,tj->ti", turned[parent], places[:, link] - places[:, parent])
-        turned.append(turned[parent] @ rotations[:, link - 1])
     last = np.stack([turned[link] for link in TIP_LINKS], axis=1)
     tips = np.einsum("tfji,tfj->tfi", last, joints[:, list(TIP_KEYPOINTS)] - places[:, list(TIP_LINKS)])
 

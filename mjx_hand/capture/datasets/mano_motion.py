@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -17,14 +18,16 @@ Array = np.ndarray
 LONGEST = 10**7  # frames: a day at 120 a second; frame numbers beyond it are damage
 
 
-def chosen_side(path: Path, present: Sequence[str], request: Request) -> str:
+def chosen_side(path: Path, present: Sequence[Any], request: Request) -> str:
     """The hand to read: the one asked for, or the only one there.
 
     Raises:
-        InputError: it is not there, or there are two and none was asked for.
+        InputError: it is not there, or there are two and none was asked for, or what is there are no sides.
     """
     if not present:
         raise InputError(f"{path}: holds no hand")
+    if any(side not in ("right", "left") for side in present):
+        raise InputError(f"{path}: names hands {list(present)!r}, expected 'right' and 'left'"[:300])
     if request.side is None and len(present) > 1:
         raise InputError(f"{path}: holds both hands; choose one with side='right' or side='left'")
     side = request.side or present[0]

@@ -66,7 +66,8 @@ def test_pca_poses_need_the_licensed_file(tmp_path):
     ("meta", "message"),
     [
         ({"num_frames": 7}, r"pose_m has shape \(6, 1, 51\), expected \(7, 1, 51\)"),
-        ({"mano_sides": []}, "holds no hand"),
+        ({"mano_sides": []}, r"mano_sides is \[\], expected a list"),
+        ({"mano_sides": ["both"]}, r"names hands \['both'\], expected 'right' and 'left'"),
         ({"mano_calib": ["nobody"]}, r"mano_nobody/mano\.yml: no such file; keep the dataset's folders"),
         ({"extrinsics": "never"}, r"extrinsics_never/extrinsics\.yml: no such file"),
     ],
@@ -88,7 +89,7 @@ def test_folders_that_do_not_fit_together(tmp_path, meta, message):
             f"extrinsics: {{apriltag: {[1.0] * 12}}}",
             "apriltag is not a rigid transform",
         ),
-        ("../../calibration/mano_20200514_142106_subject-09_right/mano.yml", "betas: big", "betas holds object"),
+        ("../../calibration/mano_20200514_142106_subject-09_right/mano.yml", "betas: [big]", "betas holds object"),
         ("pose.npz", "PK", "not a readable .npz"),
     ],
 )
