@@ -36,7 +36,7 @@ INDEPENDENT = 2.4
 # joint the wrong way to make up for a bone's length.
 MEAN_SHAPE_DEVIATION = 0.005
 # How far (m) from the model a marker counts as wrong: on the mean shape, with the shape, from key frames.
-OUTLIERS = (0.05, 0.02, 0.03)
+OUTLIERS = (0.05, 0.01, 0.03)
 KNOWN = 1e-3  # standard deviation of a shape coefficient that is known
 KEYFRAME_STEPS, SUBJECT_STEPS, FRAME_STEPS, SMOOTH_STEPS = 15, 18, 4, 2
 

@@ -56,7 +56,7 @@ def match_labels(recording: MarkerRecording, marker_set: MarkerSet, prefix: str 
             )
     chosen = {marker: labels[0] for marker, labels in found.items() if labels}
     if not chosen:
-        raise InputError(f"{name}: {_no_match(recording.names, marker_set)}")
+        raise InputError(f"{name}: {_no_match(recording.names, marker_set, prefix)}")
     at = [recording.names.index(label) for label in chosen.values()]
     picked = replace(
         recording, positions=recording.positions[:, at], visible=recording.visible[:, at], names=tuple(chosen)
@@ -80,12 +80,13 @@ def marker_of(label: str, marker_set: MarkerSet) -> str | None:
     return None
 
 
-def _no_match(labels: tuple[str, ...], marker_set: MarkerSet) -> str:
+def _no_match(labels: tuple[str, ...], marker_set: MarkerSet, prefix: str) -> str:
     """What is wrong where no label matches: often all begin with the subject's or the side's name."""
-    starts = sorted(
-        {label[: -len(n)] for label in labels for n in marker_set.names if label.lower().endswith(n.lower())}
-    )
+    found = {label[: -len(n)] for label in labels for n in marker_set.names if label.lower().endswith(n.lower())}
+    starts = ", ".join(map(repr, sorted(found - {""})))
+    if prefix:
+        return f"no label is {prefix!r} and a marker of the set" + (f"; some begin with {starts}" if starts else "")
     shown = ", ".join(labels[:6]) + (" and more" if len(labels) > 6 else "")
     if starts:
-        return f"no label is one of the marker set's, but some are after {', '.join(map(repr, starts))}: say --prefix"
+        return f"no label is one of the marker set's, but some are after {starts}: say --prefix"
     return f"none of its labels ({shown}) is in the marker set ({', '.join(marker_set.names[:6])}, ...)"

@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
+from scipy.spatial.transform import Rotation
 
 from mjx_hand.capture.marker_set import MarkerSet
 from mjx_hand.capture.recording import MarkerRecording
@@ -26,6 +27,7 @@ def simulate_markers(
     noise: float = 0.0005,
     gap_fraction: float = 0.05,
     placement: float = 0.001,
+    sliding: float = 0.0,
     fps: float | None = None,
 ) -> MarkerRecording:
     """Record a known motion of a known hand as an optical system would.
@@ -41,20 +43,23 @@ def simulate_markers(
         noise: standard deviation of each coordinate in each frame, m.
         gap_fraction: mean share of frames in which a marker is hidden, in bursts of several frames.
         placement: standard deviation of each component of a marker's constant placement error, m.
+        sliding: how far soft tissue carries a marker along the skin, in a direction of the marker's own, for each
+            radian that the nearest joint turns, m; 0.002 to 0.005 on the back of a finger.
         fps: the capture system's rate; the motion's own if None.
 
     Raises:
         InputError: the motion is not for this hand, or an argument is out of range.
     """
-    check_simulation(hand, motion, noise, gap_fraction, placement)
+    check_simulation(hand, motion, noise, gap_fraction, placement, sliding)
     if fps is not None and fps != motion.fps:
         motion = resample_motion(motion, fps)
     markers = len(marker_set.names)
-    placing, noising, hiding = np.random.default_rng(seed).spawn(3)
+    placing, noising, hiding, carrying = np.random.default_rng(seed).spawn(4)
     offset = np.zeros((markers, 3))
     offset[:, 0] = marker_set.offsets
     offset += placing.normal(scale=placement, size=offset.shape)
-    local = posed_markers(hand, motion, marker_set, offset)
+    slide = sliding * skin_slide(carrying, hand, motion, marker_set)
+    local = posed_markers(hand, motion, marker_set, offset, slide)
     world = np.einsum("tab,tmb->tma", quaternion_matrices(motion.wrist_quaternion), local)
     world += motion.wrist_position[:, None, :] + noising.normal(scale=noise, size=world.shape)
     visible = ~gap_bursts(hiding, (motion.num_frames, markers), gap_fraction, BURST * motion.fps)
@@ -68,7 +73,9 @@ def simulate_markers(
     )
 
 
-def check_simulation(hand: HandModel, motion: Motion, noise: float, gap_fraction: float, placement: float) -> None:
+def check_simulation(
+    hand: HandModel, motion: Motion, noise: float, gap_fraction: float, placement: float, sliding: float = 0.0
+) -> None:
     """Refuse what cannot be simulated."""
     check_motion(motion)
     if motion.side != hand.side:
@@ -82,8 +89,11 @@ def check_simulation(hand: HandModel, motion: Motion, noise: float, gap_fraction
         raise InputError(f"the motion has {len(motion.shape)} shape coefficients, {hand.name} only {hand.num_shape}")
     if not 0 <= gap_fraction < 1:
         raise InputError(f"gap_fraction is {gap_fraction}, expected 0 to below 1")
-    if not (np.isfinite(noise) and noise >= 0 and np.isfinite(placement) and placement >= 0):
-        raise InputError(f"noise is {noise} and placement {placement}, expected metres, 0 or more")
+    lengths = (noise, placement, sliding)
+    if not (np.isfinite(lengths).all() and min(lengths) >= 0):
+        raise InputError(
+            f"noise is {noise}, placement {placement} and sliding {sliding}, expected metres, 0 or more each"
+        )
 
 
 def gap_bursts(
@@ -104,10 +114,28 @@ def gap_bursts(
     return hidden
 
 
-def posed_markers(
-    hand: HandModel, motion: Motion, marker_set: MarkerSet, offset: Float[np.ndarray, "m 3"]
+def skin_slide(
+    rng: np.random.Generator, hand: HandModel, motion: Motion, marker_set: MarkerSet
 ) -> Float[np.ndarray, "t m 3"]:
-    """Marker centres relative to the wrist joint (m, hand axes); offsets are (normal, two tangents) components."""
+    """How far the skin carries each marker (normal, two tangents), for one metre a radian of its nearest joint.
+
+    The nearest joint is that of the link, the wrist's excepted, that moves the marker most.
+    """
+    towards = rng.uniform(0, 2 * np.pi, len(marker_set.names))
+    direction = np.stack([np.zeros_like(towards), np.cos(towards), np.sin(towards)], axis=1)
+    joint = np.asarray(hand.weights)[marker_set.vertices, 1:].argmax(axis=1)
+    angle = Rotation.from_matrix(motion.rotations[:, joint].reshape(-1, 3, 3)).magnitude()
+    return angle.reshape(motion.num_frames, -1, 1) * direction
+
+
+def posed_markers(
+    hand: HandModel,
+    motion: Motion,
+    marker_set: MarkerSet,
+    offset: Float[np.ndarray, "m 3"],
+    slide: Float[np.ndarray, "t m 3"],
+) -> Float[np.ndarray, "t m 3"]:
+    """Marker centres relative to the wrist joint (m, hand axes); offsets and slides are (normal, two tangents)."""
     ring, corners, incident = one_rings(np.asarray(hand.faces), marker_set.vertices)
     points = skinned_points(hand, ring, np.zeros((len(ring), 3)), len(motion.shape))
     at = jnp.asarray(np.searchsorted(ring, marker_set.vertices))
@@ -123,6 +151,7 @@ def posed_markers(
             jnp.asarray(corners),
             jnp.asarray(incident, jnp.float32),
             jnp.asarray(offset, jnp.float32),
+            jnp.asarray(np.pad(slide[start : start + CHUNK], ((0, len(padding)), (0, 0), (0, 0))), jnp.float32),
         )
         out.append(np.asarray(posed)[: len(rotations)])
     return np.concatenate(out).astype(np.float64)
@@ -137,6 +166,7 @@ def marker_chunk(
     corners: Int[Array, "m k 3"],
     incident: Float[Array, "m k"],
     offset: Float[Array, "m 3"],
+    slide: Float[Array, "b m 3"],
 ) -> Float[Array, "b m 3"]:
     """Markers of a chunk of frames: the skin about each marker, its normal and its tangents."""
     rest, centres = shape_points(points, jnp.broadcast_to(shape, (rotations.shape[0], *shape.shape)))
@@ -148,7 +178,8 @@ def marker_chunk(
     edge = edge1[:, :, 0]
     tangent = unit(edge - jnp.sum(edge * normal, axis=-1, keepdims=True) * normal)
     frame = jnp.stack([normal, tangent, jnp.cross(normal, tangent)], axis=-1)
-    return skin[:, at] + jnp.einsum("bmcd,md->bmc", frame, offset)
+    stuck = skin[:, at] + jnp.einsum("bmcd,md->bmc", frame, offset)
+    return stuck + jnp.einsum("bmcd,bmd->bmc", frame, slide)
 
 
 def unit(v: Float[Array, "*b 3"]) -> Float[Array, "*b 3"]:

@@ -35,7 +35,7 @@ def begin(
     mean = np.broadcast_to(np.asarray(prior.mean), (count, 15, 3))
     frames = Frames(
         observed=track.observed.astype(np.float32),
-        weight=(track.visible / marker_deviation**2).astype(np.float32),
+        weight=(track.believed / marker_deviation**2).astype(np.float32),
         rest=np.broadcast_to(rest, (count, *rest.shape)),
         centres=np.broadcast_to(centres, (count, *centres.shape)),
         mean=mean,
@@ -53,7 +53,7 @@ def begin(
 
 def keyframes(track: Track, count: int) -> Int[Array, "k"]:
     """Up to `count` of a track's frames, spread over it: of each stretch the frame that shows most markers."""
-    shown = track.visible.sum(axis=1)
+    shown = track.believed.sum(axis=1)
     edges = np.unique(np.linspace(0, len(shown), count + 1).round().astype(int))
     return np.array([start + np.argmax(shown[start:stop]) for start, stop in itertools.pairwise(edges)])
 

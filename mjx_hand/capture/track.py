@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from mjx_hand.capture.excursions import excursions
 from mjx_hand.capture.marker_set import MarkerSet
 from mjx_hand.capture.recording import MarkerRecording, check_recording
 from mjx_hand.capture.wrist import rigid_fit
@@ -29,7 +30,8 @@ class Track:
         frames: their numbers in the recording.
         observed: marker positions in the marker set's order (m), less `shift`.
         visible: which were seen.
-        shift: mean of each frame's visible markers (m, the recording's frame): single precision then suffices
+        believed: which of these the fit starts from: all but those of a marker that leaps away and back.
+        shift: mean of each frame's believed markers (m, the recording's frame): single precision then suffices
             wherever the capture system's origin is.
     """
 
@@ -37,6 +39,7 @@ class Track:
     frames: Int[Array, "b"]
     observed: Float[Array, "b m 3"]
     visible: Bool[Array, "b m"]
+    believed: Bool[Array, "b m"]
     shift: Float[Array, "b 3"]
 
 
@@ -58,13 +61,14 @@ def make_track(recording: MarkerRecording, marker_set: MarkerSet, min_visible: i
     observed = np.zeros((recording.num_frames, len(marker_set.names), 3))
     visible = np.zeros(observed.shape[:2], bool)
     observed[:, at], visible[:, at] = recording.positions, recording.visible
-    frames = np.flatnonzero(visible.sum(axis=1) >= min_visible)
+    believed = visible & ~excursions(observed, visible, recording.fps)
+    frames = np.flatnonzero(believed.sum(axis=1) >= min_visible)
     if frames.size == 0:
         raise InputError(f"{name}: no frame shows {min_visible} markers of the set; nothing to fit")
-    observed, visible = observed[frames], visible[frames]
-    shift = np.einsum("bm,bmc->bc", visible, observed) / visible.sum(axis=1)[:, None]
+    observed, visible, believed = observed[frames], visible[frames], believed[frames]
+    shift = np.einsum("bm,bmc->bc", believed, observed) / believed.sum(axis=1)[:, None]
     observed = np.where(visible[..., None], observed - shift[:, None], 0.0)
-    return Track(recording=recording, frames=frames, observed=observed, visible=visible, shift=shift)
+    return Track(recording=recording, frames=frames, observed=observed, visible=visible, believed=believed, shift=shift)
 
 
 def palm_weights(wrist_weight: Float[Array, "m"]) -> Float[Array, "m"]:
@@ -87,7 +91,7 @@ def check_scale(track: Track, rest: Float[Array, "m 3"], palm: Float[Array, "m"]
     Raises:
         InputError: the palm's markers are many times further apart, or closer together, than on the hand.
     """
-    weight = palm * track.visible
+    weight = palm * track.believed
     total = np.maximum(weight.sum(axis=1), 1e-12)[:, None]
     size = []
     for points in (track.observed, np.broadcast_to(rest, track.observed.shape)):
@@ -114,7 +118,7 @@ def wrist_guess(
         InputError: no frame's markers determine it, or they are those of a hand many times too big or small.
     """
     check_scale(track, rest, palm)
-    rotation, position, known = rigid_fit(rest, track.observed, palm * track.visible)
+    rotation, position, known = rigid_fit(rest, track.observed, palm * track.believed)
     if not known.any():
         name = track.recording.source or "recording"
         raise InputError(

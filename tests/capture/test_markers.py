@@ -71,6 +71,11 @@ def test_ray_against_a_known_triangle():
         ("markers: {a: {joint: wrist, facing: dorsal, offset: 5}}", "offset is 5, expected a number from 0 to 0.05"),
         ("markers: {a: {joint: wrist, facing: dorsal, offset: 0, along: -1}}", "along is -1"),
         ("markers: {a: {joint: wrist, facing: dorsal, offset: 0, colour: red}}", "unknown entry colour"),
+        ("markers: {a: {vertex: 3, facing: dorsal, offset: 0}}", "give either a vertex"),
+        ("markers: {a: {vertex: -1, offset: 0}}", "give either a vertex"),
+        ("markers: {a: {vertex: 3, offset: 0, within: 0}}", "within is 0"),
+        ("markers: {a: {vertex: 3, offset: 0, labels: ['(']}}", "labels has '\\(', which is not a regular expression"),
+        ("markers: {a: {vertex: 3, offset: 0, labels: [3]}}", "labels has 3"),
         ("!!python/object/apply:os.system ['true']", "not YAML"),
     ],
 )
@@ -85,6 +90,32 @@ def test_marker_set_file(tmp_path, hand):
     assert load_marker_set(path, hand).names == ("back",)
     with pytest.raises(InputError, match="no such marker set; give a YAML file, or one of hand22, glove13"):
         load_marker_set(tmp_path / "none.yaml", hand)
+
+
+def test_vertices_other_labels_and_how_exactly_a_place_is_known(hand):
+    text = """
+    offset: 0.004
+    within: 0.002
+    markers:
+      a: {vertex: 12, labels: [A1, 'A\\d+']}
+      b: {joint: index2, facing: dorsal, within: 0.008, labels: B}
+    """
+    marker_set = place_markers(parse_places(text, "set"), hand)
+    assert marker_set.vertices[0] == 12
+    assert marker_set.labels == (("A1", r"A\d+"), ("B",))
+    np.testing.assert_allclose(marker_set.place_deviation, [0.002, 0.008])
+    with pytest.raises(InputError, match=r"vertex 99999, but open hand has \d+; the set is for another hand"):
+        place_markers(parse_places("markers: {a: {vertex: 99999, offset: 0}}", "set"), hand)
+
+
+def test_the_gloves_set_lies_on_the_back_of_the_hand(hand):
+    glove = included_marker_set(hand, "glove13")
+    assert len(glove.names) == 13
+    where = dict(zip(glove.names, hand.template[glove.vertices], strict=True))
+    for finger in ("index", "middle", "ring", "little"):
+        assert where[f"{finger}_tip"][0] < where[f"{finger}_middle"][0] - 0.015  # fingers point along -x
+    assert where["hand_left"][2] > where["hand_right"][2] + 0.010  # the thumb's side is +z
+    assert (rest_offsets(glove, hand)[:3, 1] > 0.005).all()
 
 
 def test_places_off_the_hand_and_doubles_are_refused(hand):
