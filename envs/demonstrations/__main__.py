@@ -16,12 +16,13 @@ import numpy as np
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from PIL import Image
-from rich.console import Console
-from rich.table import Table
 
 from envs.demonstrations.contact_sheet import contact_sheet
 from envs.demonstrations.dataset import PARTS, YIELD, SetSettings, load_part, make_set, twins
-from envs.demonstrations.quality import Quality, check_part
+from envs.demonstrations.perform import OUTCOMES
+from envs.demonstrations.quality import check_part
+from envs.demonstrations.trials import NO_POSTURE, SPARE
+from mjx_hand.cli.output import print_table
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 from mjx_hand.motion.archive import replacing
@@ -72,8 +73,8 @@ def main(arguments: Sequence[str]) -> None:
     enable_compile_cache()
     with shares() as report:
         folder = make_set(settings, root, report)
-    for table in (_yield_table(json.loads((folder / YIELD).read_text())), _quality_table(folder)):
-        Console().print(table)
+    yields = json.loads((folder / YIELD).read_text())
+    print_table(str(folder), ("", *PARTS), _yield_rows(yields) + _quality_rows(folder))
     demonstrations = load_part(folder, PARTS[0])
     try:
         sheet = contact_sheet(demonstrations, twins(demonstrations))
@@ -83,33 +84,27 @@ def main(arguments: Sequence[str]) -> None:
         with replacing(folder / "sheet.png") as temporary:
             Image.fromarray(np.asarray(sheet)).save(temporary, format="png")
         print(f"picture: {folder / 'sheet.png'}")
-    print(f"demonstrations: {folder}")
 
 
-def _yield_table(yields: Mapping[str, Mapping[str, int]]) -> Table:
-    outcomes = sorted({outcome for tally in yields.values() for outcome in tally})
-    table = Table("part", "attempts", *outcomes)
-    for part, tally in yields.items():
-        table.add_row(part, str(sum(tally.values())), *(str(tally.get(outcome, 0)) for outcome in outcomes))
-    return table
+def _yield_rows(yields: Mapping[str, Mapping[str, int]]) -> list[tuple[str, ...]]:
+    outcomes = [o for o in (*OUTCOMES, NO_POSTURE, SPARE) if any(o in tally for tally in yields.values())]
+    attempts = ("attempts", *(str(sum(yields[part].values())) for part in PARTS))
+    return [attempts, *((outcome, *(str(yields[part].get(outcome, 0)) for part in PARTS)) for outcome in outcomes)]
 
 
-def _quality_table(folder: Path) -> Table:
-    table = Table(
-        "part", "demonstrations", "seconds", "lift (cm)", "hinges off (°)", "wrist off (mm)", "object off (mm)"
-    )
-    for part in PARTS:
-        q: Quality = check_part(folder, part)
-        table.add_row(
-            part,
-            str(len(q.lift)),
-            f"{q.seconds.min():.1f} to {q.seconds.max():.1f}",
-            f"{100 * q.lift.min():.1f} to {100 * q.lift.max():.1f}",
-            f"{np.rad2deg(q.angle_error.mean()):.1f}",
-            f"{1000 * q.wrist_error.mean():.1f}",
-            f"at most {1000 * q.object_error.max():.1f}",
-        )
-    return table
+def _quality_rows(folder: Path) -> list[tuple[str, ...]]:
+    measured = [check_part(folder, part) for part in PARTS]
+    return [
+        ("length (s)", *(_range(q.seconds) for q in measured)),
+        ("lift (cm)", *(_range(100 * q.lift) for q in measured)),
+        ("hinges from the truth (°)", *(_range(np.rad2deg(q.angle_error)) for q in measured)),
+        ("wrist from the truth (mm)", *(_range(1000 * q.wrist_error) for q in measured)),
+        ("object from the truth, at most (mm)", *(_range(1000 * q.object_error) for q in measured)),
+    ]
+
+
+def _range(values: np.ndarray) -> str:
+    return f"{values.min():.1f} to {values.max():.1f}"
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ MESHES = {
     "box": lambda s: trimesh.creation.box(extents=2 * s),
     "sphere": lambda s: trimesh.creation.icosphere(subdivisions=5, radius=s[0]),
     "cylinder": lambda s: trimesh.creation.cylinder(radius=s[0], height=2 * s[1], sections=256),
+    "capsule": lambda s: trimesh.creation.capsule(2 * s[1], s[0], count=(64, 64)),
 }
 
 
@@ -22,6 +23,7 @@ CASES = [
     ("sphere", (0.03, 0.0, 0.0)),
     ("cylinder", (0.03, 0.08, 0.0)),
     ("cylinder", (0.1, 0.01, 0.0)),
+    ("capsule", (0.03, 0.05, 0.0)),
 ]
 
 

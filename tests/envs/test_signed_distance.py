@@ -8,7 +8,12 @@ from scipy.optimize import minimize
 from envs.signed_distance import half_extents, signed_distance
 from mjx_hand.errors import InputError
 
-SIZES = {"box": (0.02, 0.03, 0.015), "sphere": (0.025, 0.0, 0.0), "cylinder": (0.02, 0.04, 0.0)}
+SIZES = {
+    "box": (0.02, 0.03, 0.015),
+    "sphere": (0.025, 0.0, 0.0),
+    "cylinder": (0.02, 0.04, 0.0),
+    "capsule": (0.02, 0.04, 0.0),
+}
 
 
 def nearest(kind, size, x):
@@ -18,6 +23,7 @@ def nearest(kind, size, x):
         "box": lambda p: size - np.abs(p),
         "sphere": lambda p: size[0] ** 2 - p @ p,
         "cylinder": lambda p: np.array([size[0] ** 2 - p[0] ** 2 - p[1] ** 2, size[1] - abs(p[2])]),
+        "capsule": lambda p: size[0] ** 2 - p[0] ** 2 - p[1] ** 2 - max(abs(p[2]) - size[1], 0) ** 2,
     }[kind]
     limits = {"type": "ineq", "fun": inside}
     return minimize(lambda p: np.sum((p - x) ** 2), x * 0.1, constraints=[limits], options={"ftol": 1e-12}).x / 100
@@ -41,6 +47,7 @@ def test_inside_it_is_what_a_fine_mesh_has(kind):
         "box": lambda: trimesh.creation.box(2 * np.array(size)),
         "sphere": lambda: trimesh.creation.icosphere(5, size[0]),
         "cylinder": lambda: trimesh.creation.cylinder(size[0], 2 * size[1], sections=512),
+        "capsule": lambda: trimesh.creation.capsule(2 * size[1], size[0], count=(256, 256)),
     }[kind]()
     points = np.random.default_rng(1).uniform(-1, 1, (200, 3)) * np.asarray(half_extents(kind, jnp.array(size))) * 0.9
     distance = np.asarray(signed_distance(kind, jnp.array(size), jnp.asarray(points)))
@@ -69,12 +76,18 @@ def test_the_gradient_is_that_of_finite_differences(kind):
 
 
 @pytest.mark.parametrize(
-    ("kind", "wanted"), [("box", (0.02, 0.03, 0.015)), ("sphere", (0.025,) * 3), ("cylinder", (0.02, 0.02, 0.04))]
+    ("kind", "wanted"),
+    [
+        ("box", (0.02, 0.03, 0.015)),
+        ("sphere", (0.025,) * 3),
+        ("cylinder", (0.02, 0.02, 0.04)),
+        ("capsule", (0.02, 0.02, 0.06)),
+    ],
 )
 def test_half_extents_bound_the_body(kind, wanted):
     np.testing.assert_allclose(half_extents(kind, jnp.array(SIZES[kind])), wanted, rtol=1e-6)
 
 
 def test_an_unknown_kind_is_refused():
-    with pytest.raises(InputError, match=r"'cone' is not known; valid: box, sphere, cylinder"):
+    with pytest.raises(InputError, match=r"'cone' is not known; valid: box, sphere, cylinder, capsule"):
         signed_distance("cone", jnp.ones(3), jnp.zeros(3))
