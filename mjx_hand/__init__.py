@@ -12,7 +12,7 @@ Metres, radians, seconds; quaternions wxyz; MANO's joint order and right-hand fr
 from mjx_hand.capture.load import load_motion
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
-from mjx_hand.projection import project
+from mjx_hand.projection import fit_functional_axes, project
 from mjx_hand.retarget.sequence import retarget_sequence
 from mjx_hand.rigid.build import build_rigid_hand
 from mjx_hand.rigid.rigid_hand import joint_rotations
@@ -23,6 +23,7 @@ __all__ = [
     "InputError",
     "__version__",
     "build_rigid_hand",
+    "fit_functional_axes",
     "joint_rotations",
     "load_hand",
     "load_motion",
