@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 from mjx_hand.capture.datasets.contents import plain, read_contents
 from mjx_hand.capture.datasets.dataset_format import Request
 from mjx_hand.errors import InputError
-from mjx_hand.hand.joints import PARENTS
+from mjx_hand.hand.joints import PARENTS, TIP_LINKS
 from mjx_hand.hand.load import load_hand
 from mjx_hand.hand.mano_file import load_mano_file
 from mjx_hand.motion.layout import numbers
@@ -73,7 +73,8 @@ def subject_of(
     centres = hand.joint_regressor.astype(float) @ rest
     offset = np.zeros_like(centres)
     offset[1:] = centres[1:] - centres[list(PARENTS[1:])]
-    return Subject(shape, centres[0], link_offset=offset)
+    tips = rest[hand.tip_vertices] - centres[list(TIP_LINKS)]
+    return Subject(shape, centres[0], link_offset=offset, tip_offset=tips)
 
 
 def one_shape(shapes: Float[Array, "*t s"], valid: Bool[Array, "t"]) -> Float[Array, "s"]:

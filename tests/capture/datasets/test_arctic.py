@@ -1,9 +1,11 @@
 import numpy as np
 import pytest
+from body_models.mano.numpy import MANO
 from scipy.spatial.transform import Rotation
 
 from mjx_hand.capture.load import load_motion
 from mjx_hand.errors import InputError
+from mjx_hand.hand.joints import TIP_LINKS
 from tests.capture.datasets.subjects import joints_of, licensed_file, licensed_hand, posed_joints, rest_joints, take
 
 TAKE = take()
@@ -38,6 +40,30 @@ def test_joints_are_where_the_datasets_own_formula_puts_them(tmp_path, side):
     )
     np.testing.assert_allclose(motion.shape, TAKE.shape)
     assert (motion.fps, motion.side, motion.source) == (30.0, side, f"ARCTIC s01/box_grab_01, {side} hand")
+
+
+@pytest.mark.filterwarnings("ignore")  # the oracle's own
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_joints_are_where_another_implementation_of_mano_puts_them(tmp_path, side):
+    """body-models, made as the dataset's tools make the hand: the file as it is, and not the flat mean."""
+    mano = licensed_file(tmp_path, side)
+    hand = hand_of(side)
+    motion = load_motion(write(tmp_path, **{side: hand}), mano=mano)
+    expected = MANO(model_path=mano, flat_hand_mean=False).forward_skeleton(
+        hand["pose"].reshape(6, 15, 3).astype(np.float32),
+        wrist_rotation=hand["rot"].astype(np.float32),
+        shape=np.tile(TAKE.shape, (6, 1)).astype(np.float32),
+        global_translation=hand["trans"].astype(np.float32),
+    )
+    np.testing.assert_allclose(joints_of(motion), expected[..., :3, 3], atol=1e-5)
+
+
+def test_finger_tips_are_the_subjects_own(tmp_path):
+    motion = load_motion(write(tmp_path, right=hand_of("right")), mano=licensed_file(tmp_path))
+    rest = rest_joints(licensed_hand(), TAKE.shape)
+    assert motion.tip_offset is not None
+    apart = np.linalg.norm(motion.tip_offset - (rest[16:] - rest[list(TIP_LINKS)]), axis=1)
+    assert apart.max() < 0.01  # files other than MANO's own have no agreed tip vertices: the farthest one is taken
 
 
 def test_shape_may_be_given_for_each_frame_and_one_wild_one_does_not_matter(tmp_path):
