@@ -16,7 +16,7 @@ from mjx_hand.motion.resample import matrix_quaternions, quaternion_matrices
 PALM = 0.25  # least weight of the wrist's link at a marker that tells where the wrist is
 MIN_PALM = 3
 # A hand is never this many times as large or as small as the mean one; a wrong unit is off by ten or more.
-TOO_BIG = 3.0
+TOO_BIG = 3.2
 
 Array = np.ndarray
 
@@ -102,9 +102,12 @@ def check_scale(track: Track, rest: Float[Array, "m 3"], palm: Float[Array, "m"]
         return
     ratio = float(np.sqrt(np.median(size[0][known] / size[1][known])))
     if not 1 / TOO_BIG < ratio < TOO_BIG:
-        times = f"{ratio:.2g} times too big" if ratio > 1 else f"{1 / max(ratio, 1e-9):.2g} times too small"
+        wrong = round(abs(np.log10(max(ratio, 1e-9))))  # units are powers of ten apart, hands differ by less
+        times = f"about {10**wrong} times too {'big' if ratio > 1 else 'small'}"
         hint = (
-            "millimetres were taken for metres: read it with --units mm" if ratio > 300 else "check its unit: --units"
+            "millimetres were taken for metres: read it with --units mm"
+            if wrong == 3 and ratio > 1
+            else "check its unit"
         )
         raise InputError(f"{track.recording.source or 'recording'}: the hand is {times}; {hint}")
 
