@@ -21,6 +21,7 @@ def build(
     side: Literal["right", "left"] = "right",
     mano: Path | None = None,
     wrist_joints: bool = False,
+    collision: Literal["capsules", "hulls"] = "capsules",
     report: bool = False,
     motion: Path | None = None,
 ) -> None:
@@ -32,6 +33,7 @@ def build(
         side: which hand.
         mano: a licensed MANO file (MANO_RIGHT.pkl, MANO_LEFT.pkl or .npz); without it, the open hand.
         wrist_joints: put six movable joints between the world and the wrist.
+        collision: shapes that touch: capsules, or the convex hull of each link.
         report: measure how far the rigid links' skin lies from the blended skin, in postures from fist to spread
             fingers: a table here, skin_error.csv and skin_error.png in the folder.
         motion: a recording whose postures the report measures too.
@@ -43,8 +45,8 @@ def build(
     measured = None
     with filling(out) as folder:  # all files or none
         names = [
-            write_urdf(rigid, folder, wrist_joints=wrist_joints).name,
-            write_mjcf(rigid, folder, base="actuated" if wrist_joints else "fixed").name,
+            write_urdf(rigid, folder, wrist_joints=wrist_joints, collision=collision).name,
+            write_mjcf(rigid, folder, base="actuated" if wrist_joints else "fixed", collision=collision).name,
         ]
         if report:
             from mjx_hand.cli.skin_report import write_skin_report

@@ -7,8 +7,12 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+from jaxtyping import Float, Int
+
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import LINKS
+from mjx_hand.rigid.hulls import convex_hulls, hull_name
 from mjx_hand.rigid.rigid_hand import RigidHand
 
 MESHES = "meshes"  # the subfolder that descriptions refer to by relative paths
@@ -50,13 +54,21 @@ def filling(folder: str | Path) -> Iterator[Path]:
         shutil.rmtree(temporary, ignore_errors=True)
 
 
-def write_meshes(rigid: RigidHand, folder: Path) -> None:
-    """Write each link's surface as `meshes/<link>.obj` (m, link frame); shared corners keep it watertight."""
+def write_meshes(rigid: RigidHand, folder: Path, collision: str) -> None:
+    """Write each link's surface as `meshes/<link>.obj` (m, link frame), and its hull where `collision` is "hulls"."""
     (folder / MESHES).mkdir()
     for link, vertices, faces in zip(LINKS, rigid.mesh_vertices, rigid.mesh_faces, strict=True):
-        lines = [f"v {x:.7f} {y:.7f} {z:.7f}" for x, y, z in vertices.tolist()]
-        lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
-        (folder / MESHES / f"{link}.obj").write_text("\n".join(lines) + "\n")
+        _write_obj(folder / MESHES / f"{link}.obj", vertices, faces)
+    if collision == "hulls":
+        for link, (vertices, faces) in zip(LINKS, convex_hulls(rigid), strict=True):
+            _write_obj(folder / MESHES / f"{hull_name(link)}.obj", vertices, faces)
+
+
+def _write_obj(path: Path, vertices: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"]) -> None:
+    """Triangles that share their corners, so that a closed surface stays closed."""
+    lines = [f"v {x:.7f} {y:.7f} {z:.7f}" for x, y, z in vertices.tolist()]
+    lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
+    path.write_text("\n".join(lines) + "\n")
 
 
 def file_stem(rigid: RigidHand) -> str:

@@ -1,6 +1,7 @@
 """A rigid hand as a MuJoCo model, in memory (`MjSpec`) or on disk (MJCF and meshes)."""
 
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -9,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import FINGERS, HINGE_LINKS, HINGES, LINKS, PARENTS, TIP_LINKS
 from mjx_hand.rigid.gains import Gains
+from mjx_hand.rigid.hulls import check_collision, convex_hulls, hull_name
 from mjx_hand.rigid.mesh_folder import MESHES, file_stem, filling, write_meshes
 from mjx_hand.rigid.rigid_hand import RigidHand, axes_in_links
 
@@ -18,6 +20,13 @@ WRIST_TURNS = ("wrist_roll", "wrist_pitch", "wrist_yaw")
 VISUAL_GROUP, COLLISION_GROUP = 2, 3
 
 _SKIN = (0.86, 0.66, 0.55, 1.0)
+_COLLIDES: dict[str, Any] = {
+    "group": COLLISION_GROUP,
+    "contype": 1,
+    "conaffinity": 0,
+    "mass": 0,
+    "rgba": (0.3, 0.5, 0.8, 0.5),
+}
 WRIST_REACH = 2.0  # metres that the wrist's slides may travel each way
 
 
@@ -28,11 +37,12 @@ def hand_spec(
     prefix: str = "",
     visual: bool = True,
     gains: Gains | None = None,
+    collision: str = "capsules",
 ) -> mujoco.MjSpec:
     """The hand as a MuJoCo spec: bodies named as `LINKS`, joints and position actuators as `HINGES`.
 
     The wrist body's origin is the wrist joint and its axes are the hand frame's. Joints, actuators and so qpos and ctrl
-    run in the same order: the wrist's six where it is actuated, then `HINGES`. Collision capsules (group 3) have
+    run in the same order: the wrist's six where it is actuated, then `HINGES`. Collision shapes (group 3) have
     contype 1 and conaffinity 0: they meet MuJoCo's default geoms but not each other. Sites `<finger>_tip` mark the
     finger tips, with a framepos sensor each of the same name.
 
@@ -43,10 +53,12 @@ def hand_spec(
         prefix: put before every name.
         visual: add the links' meshes (group 2, no contacts).
         gains: position gains and force limits; the default `Gains()`.
+        collision: "capsules", or "hulls", the links' convex hulls.
 
     Raises:
-        InputError: an unknown base.
+        InputError: an unknown base or collision shape.
     """
+    check_collision(collision)
     if base not in BASES:
         raise InputError(f"base is {base!r}; valid: {', '.join(BASES)}")
     gains = Gains() if gains is None else gains
@@ -60,7 +72,10 @@ def hand_spec(
         bodies.append(_add_link(parent, rigid, link, prefix + name))
     if visual:
         _add_meshes(spec, bodies, rigid, prefix)
-    _add_capsules(bodies, rigid, prefix)
+    if collision == "hulls":
+        _add_hulls(spec, bodies, rigid, prefix)
+    else:
+        _add_capsules(bodies, rigid, prefix)
     _add_wrist_joints(spec, bodies[0], base, prefix, gains)
     _add_hinges(spec, bodies, rigid, prefix, gains)
     for finger, link, tip in zip(FINGERS, TIP_LINKS, rigid.tip_offset, strict=True):
@@ -73,19 +88,25 @@ def hand_spec(
 
 
 def write_mjcf(
-    rigid: RigidHand, folder: str | Path, *, base: str = "fixed", prefix: str = "", gains: Gains | None = None
+    rigid: RigidHand,
+    folder: str | Path,
+    *,
+    base: str = "fixed",
+    prefix: str = "",
+    gains: Gains | None = None,
+    collision: str = "capsules",
 ) -> Path:
     """Write `<side>_hand.xml` and `meshes/*.obj`, with paths relative to the folder; returns the XML's path.
 
     Args as of `hand_spec`. The folder appears whole or not at all.
 
     Raises:
-        InputError: an unknown base, or a folder that cannot be written.
+        InputError: an unknown base or collision shape, or a folder that cannot be written.
     """
-    spec = hand_spec(rigid, base=base, prefix=prefix, visual=True, gains=gains)
+    spec = hand_spec(rigid, base=base, prefix=prefix, visual=True, gains=gains, collision=collision)
     name = f"{file_stem(rigid)}.xml"
     with filling(folder) as temporary:
-        write_meshes(rigid, temporary)
+        write_meshes(rigid, temporary, collision)
         spec.meshdir = MESHES
         spec.modelfiledir = str(temporary)
         for mesh in spec.meshes:
@@ -134,12 +155,16 @@ def _add_capsules(bodies: list[mujoco.MjsBody], rigid: RigidHand, prefix: str) -
             type=mujoco.mjtGeom.mjGEOM_CAPSULE,
             fromto=np.asarray(ends).ravel(),
             size=[float(radius), 0, 0],
-            group=COLLISION_GROUP,
-            contype=1,
-            conaffinity=0,
-            mass=0,
-            rgba=(0.3, 0.5, 0.8, 0.5),
+            **_COLLIDES,
         )
+
+
+def _add_hulls(spec: mujoco.MjSpec, bodies: list[mujoco.MjsBody], rigid: RigidHand, prefix: str) -> None:
+    for link, body, (vertices, faces) in zip(LINKS, bodies, convex_hulls(rigid), strict=True):
+        name = prefix + hull_name(link)
+        mesh = spec.add_mesh(name=name)
+        mesh.uservert, mesh.userface = vertices.ravel(), faces.ravel()
+        body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **_COLLIDES)
 
 
 def capsule_names(rigid: RigidHand) -> list[str]:

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from mjx_hand.hand.joints import FINGERS, HINGE_LINKS, HINGES, LINKS, PARENTS, TIP_LINKS
 from mjx_hand.rigid.gains import Gains
+from mjx_hand.rigid.hulls import check_collision, hull_name
 from mjx_hand.rigid.mesh_folder import MESHES, file_stem, filling, write_meshes
 from mjx_hand.rigid.mjcf import WRIST_REACH, WRIST_SLIDES, WRIST_TURNS
 from mjx_hand.rigid.rigid_hand import RigidHand, axes_in_links
@@ -24,7 +25,14 @@ _SMALL_INERTIA = 1e-9 * np.eye(3)  # kg m^2
 _WRIST_FORCE, _WRIST_TORQUE, _WRIST_SPEED = 200.0, 20.0, 2.0  # N, N m, m/s: what the limits of the wrist's joints state
 
 
-def write_urdf(rigid: RigidHand, folder: str | Path, *, wrist_joints: bool = False, gains: Gains | None = None) -> Path:
+def write_urdf(
+    rigid: RigidHand,
+    folder: str | Path,
+    *,
+    wrist_joints: bool = False,
+    gains: Gains | None = None,
+    collision: str = "capsules",
+) -> Path:
     """Write `<side>_hand.urdf` and `meshes/*.obj`, with paths relative to the folder; returns the URDF's path.
 
     Links are named as `hand.joints.LINKS`, joints as `HINGES`; finger tips are links `<finger>_tip` on fixed joints.
@@ -36,20 +44,22 @@ def write_urdf(rigid: RigidHand, folder: str | Path, *, wrist_joints: bool = Fal
         wrist_joints: put the joints wrist_x, wrist_y, wrist_z (prismatic), wrist_roll, wrist_pitch and wrist_yaw
             between a root link `base` and the wrist.
         gains: force limits and speeds for `<limit>`; the default `Gains()`.
+        collision: "capsules" (each a cylinder and two spheres), or "hulls" (`meshes/<link>_hull.obj`).
 
     Raises:
-        InputError: the folder cannot be written.
+        InputError: an unknown collision shape, or a folder that cannot be written.
     """
-    robot = urdf_tree(rigid, wrist_joints=wrist_joints, gains=Gains() if gains is None else gains)
+    check_collision(collision)
+    robot = urdf_tree(rigid, wrist_joints=wrist_joints, gains=Gains() if gains is None else gains, collision=collision)
     ET.indent(robot)
     name = f"{file_stem(rigid)}.urdf"
     with filling(folder) as temporary:
-        write_meshes(rigid, temporary)
+        write_meshes(rigid, temporary, collision)
         ET.ElementTree(robot).write(temporary / name, encoding="utf-8", xml_declaration=True)
     return Path(folder) / name
 
 
-def urdf_tree(rigid: RigidHand, *, wrist_joints: bool, gains: Gains) -> ET.Element:
+def urdf_tree(rigid: RigidHand, *, wrist_joints: bool, gains: Gains, collision: str) -> ET.Element:
     """The `<robot>` element; meshes are named, not written."""
     robot = ET.Element("robot", name=file_stem(rigid))
     # For MuJoCo alone; others skip it. Its own default drops folders from mesh paths, and the meshes with them.
@@ -58,7 +68,7 @@ def urdf_tree(rigid: RigidHand, *, wrist_joints: bool, gains: Gains) -> ET.Eleme
     if wrist_joints:
         _add_wrist_joints(robot)
     for link, name in enumerate(LINKS):
-        _add_link(robot, rigid, link, name)
+        _add_link(robot, rigid, link, name, collision)
     hinges_of = {link: [h for h, moved in enumerate(HINGE_LINKS) if moved == link] for link in range(1, len(LINKS))}
     axes = axes_in_links(rigid)
     for link, hinges in hinges_of.items():
@@ -81,7 +91,7 @@ def urdf_tree(rigid: RigidHand, *, wrist_joints: bool, gains: Gains) -> ET.Eleme
     return robot
 
 
-def _add_link(robot: ET.Element, rigid: RigidHand, link: int, name: str) -> None:
+def _add_link(robot: ET.Element, rigid: RigidHand, link: int, name: str, collision: str) -> None:
     element = ET.SubElement(robot, "link", name=name)
     inertia = np.asarray(rigid.link_inertia[link])
     _add_inertial(element, float(rigid.link_mass[link]), np.asarray(rigid.link_com[link]), inertia)
@@ -89,6 +99,10 @@ def _add_link(robot: ET.Element, rigid: RigidHand, link: int, name: str) -> None
     ET.SubElement(ET.SubElement(visual, "geometry"), "mesh", filename=f"{MESHES}/{name}.obj")
     skin = ET.SubElement(visual, "material", name="skin")
     ET.SubElement(skin, "color", rgba="0.86 0.66 0.55 1")
+    if collision == "hulls":
+        hull = ET.SubElement(ET.SubElement(element, "collision"), "geometry")
+        ET.SubElement(hull, "mesh", filename=f"{MESHES}/{hull_name(name)}.obj")
+        return
     for k, owner in enumerate(rigid.capsule_links):
         if owner == link:
             _add_capsule(element, np.asarray(rigid.capsule_ends[k]), float(rigid.capsule_radius[k]))

@@ -38,6 +38,12 @@ def test_summary_names_links_masses_and_how_to_load(tmp_path, capsys):
     assert mujoco.MjModel.from_xml_path(str(tmp_path / "left" / "left_hand.xml")).nq == 26
 
 
+def test_hulls_on_request(tmp_path):
+    assert main(["build", "--out", str(tmp_path / "hand"), "--collision", "hulls"]) == 0
+    assert len(list((tmp_path / "hand" / "meshes").glob("*_hull.obj"))) == 16
+    assert mujoco.MjModel.from_xml_path(str(tmp_path / "hand" / "right_hand.xml")).nmesh == 32
+
+
 def test_report_measures_the_skin(tmp_path, capsys):
     assert main(["build", "--out", str(tmp_path / "hand"), "--shape", "1", "--report"]) == 0
     out = capsys.readouterr().out

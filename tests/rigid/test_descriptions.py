@@ -104,6 +104,58 @@ def test_written_meshes_are_watertight_and_relative(rigid, folder):
     assert "vertex=" not in text
 
 
+@pytest.fixture(scope="module")
+def with_hulls(rigid, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("hulls")
+    write_urdf(rigid, folder, collision="hulls")
+    write_mjcf(rigid, folder, collision="hulls")
+    return folder
+
+
+def test_hulls_are_convex_closed_and_around_their_links(rigid, with_hulls):
+    urdf = ET.parse(with_hulls / f"{rigid.side}_hand.urdf").getroot()
+    paths = [mesh.get("filename") for collision in urdf.iter("collision") for mesh in collision.iter("mesh")]
+    assert paths == [f"meshes/{name}_hull.obj" for name in LINKS]
+    assert not list(urdf.iter("cylinder"))
+    for path, vertices in zip(paths, rigid.mesh_vertices, strict=True):
+        hull = trimesh.load_mesh(with_hulls / path, process=False)
+        assert hull.is_watertight
+        assert hull.is_convex
+        assert hull.volume > 0
+        beyond = np.einsum("fi,fvi->fv", hull.face_normals, vertices[None] - hull.triangles[:, 0][:, None])
+        assert beyond.max() < 1e-6
+
+
+def test_hulls_collide_in_engines(rigid, with_hulls):
+    for suffix in ("urdf", "xml"):
+        model = mujoco.MjModel.from_xml_path(str(with_hulls / f"{rigid.side}_hand.{suffix}"))
+        colliding = (model.geom_contype > 0) | (model.geom_conaffinity > 0)
+        assert set(model.geom_type[colliding].tolist()) == {int(mujoco.mjtGeom.mjGEOM_MESH)}
+        np.testing.assert_allclose(model.body_mass[model.body("wrist").id], rigid.link_mass[0], rtol=1e-5)
+    # A ball pressed onto the palm rests on it, as on the skin: not on the capsules, which are not there.
+    spec = hand_spec(rigid, collision="hulls", visual=False)
+    assert {geom.name for geom in spec.geoms} == {f"{name}_hull" for name in LINKS}
+    middle = np.asarray(rigid.mesh_vertices[0]).mean(axis=0)
+    top = np.asarray(rigid.mesh_vertices[0])[:, 1].max()
+    ball = spec.worldbody.add_body(name="ball", pos=[middle[0], top + 0.05, middle[2]])
+    ball.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 1, 0])
+    ball.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.02, 0, 0], mass=0.05)
+    spec.option.gravity = [0, -9.81, 0]
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    for _ in range(800):
+        mujoco.mj_step(model, data)
+    assert data.ncon > 0
+    assert top - 0.02 < data.body("ball").xpos[1] - 0.02 < top + 0.001
+
+
+@pytest.mark.parametrize("write", [write_urdf, write_mjcf])
+def test_unknown_collision_shape_is_refused(right, tmp_path, write):
+    with pytest.raises(InputError, match="collision is 'mesh'; valid: capsules, hulls"):
+        write(right, tmp_path / "out", collision="mesh")
+    assert not list(tmp_path.iterdir())
+
+
 def test_descriptions_survive_a_move(rigid, folder, tmp_path):
     moved = tmp_path / "elsewhere"
     folder.rename(moved)
@@ -167,7 +219,7 @@ def test_other_files_in_the_folder_stay(right, tmp_path):
 
 @pytest.mark.parametrize("write", [write_urdf, write_mjcf])
 def test_a_failed_write_leaves_nothing(right, tmp_path, monkeypatch, write):
-    def broken(rigid, folder):
+    def broken(rigid, folder, collision):
         (folder / "half").write_text("")
         raise OSError(28, "No space left on device")
 

@@ -1,4 +1,4 @@
-"""Our forward kinematics against yourdfpy, MuJoCo (both descriptions) and, where installed, Pinocchio."""
+"""Our forward kinematics against yourdfpy and MuJoCo (both descriptions); `test_dynamics` has more engines."""
 
 import jax.numpy as jnp
 import mujoco
@@ -82,17 +82,3 @@ def test_yourdfpy_agrees(rigid, folder, angles, poses):
         np.testing.assert_allclose(found[:, :3, 3], positions, atol=TOLERANCE)
         found_tips = [robot.get_transform(f"{finger}_tip", "wrist")[:3, 3] for finger in FINGERS]
         np.testing.assert_allclose(found_tips, tips, atol=TOLERANCE)
-
-
-def test_pinocchio_agrees(rigid, folder, angles, poses):
-    pinocchio = pytest.importorskip("pinocchio")
-    model = pinocchio.buildModelFromUrdf(str(folder / f"{rigid.side}_hand.urdf"))
-    data = model.createData()
-    for row, rotations, positions in zip(angles, *poses[:2], strict=True):
-        q = pinocchio.neutral(model)
-        for name, angle in zip(HINGES, row, strict=True):
-            q[model.joints[model.getJointId(name)].idx_q] = angle
-        pinocchio.framesForwardKinematics(model, data, q)
-        found = [data.oMf[model.getFrameId(name)] for name in LINKS]
-        np.testing.assert_allclose([pose.rotation for pose in found], rotations, atol=TOLERANCE)
-        np.testing.assert_allclose([pose.translation for pose in found], positions, atol=TOLERANCE)
