@@ -12,6 +12,8 @@ from mjx_hand.errors import InputError
 # Bare arrays: how many points tell the layout. Leap's 26 with carpal ends must name itself.
 _COUNTS = {len(layout.joints): layout for name, layout in reversed(LAYOUTS.items()) if name != "leap_bones"}
 
+_ENOUGH = 10  # joints of one layout by which a hand is recognised, even where some are missing
+
 
 def plain(name: str) -> str:
     """What devices' names of a joint share: of `XR_HAND_JOINT_INDEX_TIP_EXT` and `index-finger-tip` "indextip"."""
@@ -27,6 +29,12 @@ def layout_named(names: Sequence[str]) -> KeypointLayout | None:
         if {plain(name) for name in layout.keypoints if name is not None} <= given:
             return layout
     return None
+
+
+def names_a_hand(names: Sequence[str]) -> bool:
+    """Whether these are joints of a hand: of one layout enough that nothing else would have them all."""
+    given = {plain(name) for name in names}
+    return any(len(given & {plain(name) for name in layout.joints}) >= _ENOUGH for layout in LAYOUTS.values())
 
 
 def named_keypoints(

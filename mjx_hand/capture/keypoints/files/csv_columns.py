@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from mjx_hand.capture.keypoints.files.reader import KeypointReader
-from mjx_hand.capture.keypoints.names import counted_keypoints, layout_named, named_keypoints
+from mjx_hand.capture.keypoints.names import counted_keypoints, named_keypoints, names_a_hand
 from mjx_hand.capture.keypoints.recording import SIDES, KeypointRecording, check_keypoints
 from mjx_hand.capture.keypoints.size import unit_factor
 from mjx_hand.capture.keypoints.times import evenly
@@ -56,7 +56,7 @@ def _counted(joints: dict[str, list[int]]) -> bool:
 
 def _recognises(lines: Any) -> bool:
     columns = _columns(_header(lines)[1])
-    return any(layout_named(list(joints)) or (_counted(joints) and len(joints) > 19) for joints in columns.values())
+    return any(names_a_hand(list(joints)) or (_counted(joints) and len(joints) > 19) for joints in columns.values())
 
 
 def _read(path: Path, lines: Any, unit: str | None) -> dict[str, KeypointRecording]:

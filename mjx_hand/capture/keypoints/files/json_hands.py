@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from mjx_hand.capture.keypoints.names import layout_named
+from mjx_hand.capture.keypoints.names import names_a_hand
 from mjx_hand.capture.keypoints.recording import SIDES
 
 _WORLD = ("worldLandmarks", "world_landmarks", "multi_hand_world_landmarks", "hand_world_landmarks")
@@ -96,7 +96,7 @@ def _labels(value: Any) -> list[str]:
 
 def _points(value: Any) -> tuple[np.ndarray, tuple[str, ...]] | None:
     """Points and names of one hand's joints; None if the value is something else."""
-    if isinstance(value, dict) and layout_named(list(value)) is not None:
+    if isinstance(value, dict) and names_a_hand(list(value)):
         points = [_point(each) for each in value.values()]
         kept = [(name, p) for name, p in zip(value, points, strict=True) if p is not None]
         return np.array([p for _, p in kept], dtype=float).reshape(-1, 3), tuple(name for name, _ in kept)
