@@ -12,7 +12,7 @@ WEIGHT = 3.0  # of a metre along the surface's normal, against 1 of a metre of t
 
 def contact_normals(
     tips: Float[np.ndarray, "t 5 3"],
-    wrist_from_object: Float[np.ndarray, "t 4 4"],
+    wrist_from_object: Float[np.ndarray, "poses 4 4"],
     vertices: Float[np.ndarray, "v 3"],
     faces: Int[np.ndarray, "f 3"],
     *,
@@ -34,10 +34,9 @@ def contact_normals(
     Raises:
         InputError: tips, poses or mesh do not fit or are not finite.
     """
-    if tips.shape[0] != wrist_from_object.shape[0]:
-        raise InputError(
-            f"{tips.shape[0]} frames of tips and {wrist_from_object.shape[0]} of object poses; give a pair"
-        )
+    frames, poses = len(tips), len(wrist_from_object)
+    if frames != poses:
+        raise InputError(f"{frames} frames of tips and {poses} of object poses; give as many of both")
     if not (np.isfinite(tips).all() and np.isfinite(wrist_from_object).all()):
         raise InputError("tips or object poses hold NaN or infinity; leave those frames out")
     rotation, origin = wrist_from_object[:, :3, :3], wrist_from_object[:, :3, 3]

@@ -32,7 +32,7 @@ def test_a_box_has_the_distances_of_a_box():
 def test_a_hollow_curved_mesh_is_as_trimesh_has_it():
     ring = trimesh.creation.torus(0.04, 0.015, major_sections=24, minor_sections=12)
     points = np.random.default_rng(1).uniform(-0.06, 0.06, (120, 3)) * [1, 1, 0.4]
-    closest, distance, _ = trimesh.proximity.closest_point(ring, points)
+    _, distance, _ = trimesh.proximity.closest_point(ring, points)
     found, _ = signed_distance(points, np.array(ring.vertices), np.array(ring.faces))
     np.testing.assert_allclose(np.abs(found), distance, atol=1e-6)
     np.testing.assert_array_equal(found < 0, ring.contains(points))
