@@ -7,13 +7,18 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from mjx_hand.capture.joint_ranges import beyond, joint_ranges
 from mjx_hand.capture.linearise import PoseState, left_jacobian, pose_jacobian, residuals, step_state
 from mjx_hand.capture.normal_blocks import NormalBlocks, joint_covariance, normal_blocks, solve_blocks
 from mjx_hand.capture.pose_prior import joint_precision, pose_prior
+from mjx_hand.capture.pose_solver import Frames, energy, normal_equations, trust
 from mjx_hand.capture.skinned_points import shape_points, skinned_points
 from mjx_hand.capture.smoothing import second_difference_bands, smooth_vectors
 from mjx_hand.capture.wrist import rigid_fit
-from mjx_hand.hand.joints import LINKS
+from mjx_hand.hand.joints import HINGE_LINKS, LINKS
+from mjx_hand.hand.load import load_hand
+from mjx_hand.rigid.axes import anatomical_axes
+from mjx_hand.rigid.limits import anatomical_limits
 from mjx_hand.rotations import exp, hat, log
 
 
@@ -38,6 +43,89 @@ def test_jacobian_is_the_derivative(hand, marker_set):
     np.testing.assert_allclose(residual, moved(jnp.zeros((2, 51))), atol=1e-6)
     for b in range(2):
         np.testing.assert_allclose(jacobian[b], by_step[b, :, :, b], atol=2e-6)
+
+
+def test_gradient_is_that_of_the_energy_with_outliers_ranges_and_coupling(hand, marker_set):
+    """Against automatic differentiation: poses far outside the ranges, and markers both near the model and far off."""
+    rng = np.random.default_rng(5)
+    points = skinned_points(hand, marker_set.vertices, np.zeros((22, 3)), 10)
+    points = dataclasses.replace(points, pose_directions=jnp.zeros_like(points.pose_directions))
+    rest, centres = shape_points(points, jnp.zeros((2, 10)))
+    prior = pose_prior(hand)
+    state = PoseState(
+        vectors=jnp.asarray(rng.normal(size=(2, 15, 3)), jnp.float32),
+        wrist_rotation=exp(jnp.asarray(rng.normal(size=(2, 3)), jnp.float32)),
+        wrist_position=jnp.zeros((2, 3)),
+    )
+    assert (jnp.abs(beyond(prior.ranges, state.vectors)) > 0).sum() > 5
+    off = jnp.asarray(residuals(points, rest, centres, state, jnp.zeros((2, 22, 3))))
+    seen = jnp.einsum("bac,bmc->bma", state.wrist_rotation, off)
+    scatter = rng.normal(size=(2, 22, 3)) * np.where(rng.random((2, 22, 1)) < 0.3, 0.05, 0.002)
+    frames = Frames(
+        observed=seen + jnp.asarray(scatter, jnp.float32),
+        weight=jnp.full((2, 22), 1e6),
+        rest=rest,
+        centres=centres,
+        mean=jnp.broadcast_to(prior.mean, (2, 15, 3)),
+        precision=prior.precision,
+        ranges=prior.ranges,
+        outlier=jnp.asarray(0.01),
+    )
+
+    def half_energy(step):
+        moved = step_state(state, step)
+        return energy(frames, residuals(points, rest, centres, moved, frames.observed), moved).sum() / 2
+
+    _, gradient, _, _ = jax.jit(normal_equations)(points, frames, state)
+    expected = jax.jit(jax.grad(half_energy))(jnp.zeros((2, 51)))
+    np.testing.assert_allclose(gradient, expected, rtol=2e-3, atol=2e-3 * float(jnp.abs(expected).max()))
+
+
+def test_trust_falls_with_the_distance(hand):
+    residual = jnp.asarray([[[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.1, 0.0]]])
+    frames = Frames(
+        observed=residual,
+        weight=jnp.ones((1, 3)),
+        rest=residual,
+        centres=jnp.zeros((1, 16, 3)),
+        mean=jnp.zeros((1, 15, 3)),
+        precision=jnp.zeros((5, 9, 9)),
+        ranges=joint_ranges(hand),
+        outlier=jnp.asarray(0.01),
+    )
+    np.testing.assert_allclose(trust(frames, residual)[0], [1.0, 0.25, 1 / 101**2], rtol=1e-5)
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_ranges_are_those_of_the_hinges(side):
+    """A joint turned about one hinge by its limit and a little more is beyond by that little."""
+    hand = load_hand(side=side)
+    ranges = joint_ranges(hand)
+    axes = anatomical_axes(np.asarray(hand.joint_regressor, np.float64) @ hand.template, side)
+    lower, upper = anatomical_limits()
+    for hinge, axis in enumerate(axes):
+        joint = HINGE_LINKS[hinge] - 1
+        for limit, more in ((upper[hinge], 0.1), (lower[hinge], -0.1), (upper[hinge], -0.05)):
+            vectors = np.zeros((1, 15, 3), np.float32)
+            vectors[0, joint] = (limit + more) * axis
+            over = np.asarray(beyond(ranges, jnp.asarray(vectors)))[0]
+            expected = more if abs(more) == 0.1 else 0.0
+            assert over[joint].sum() == pytest.approx(expected, abs=1e-5)
+            assert not np.delete(over, joint, axis=0).any()
+
+
+def test_a_distal_joint_is_expected_to_bend_with_its_neighbour(hand):
+    """Of a finger whose middle joint is known, the last is expected two thirds as far along."""
+    prior = pose_prior(hand)
+    flexion = np.asarray(prior.ranges.axes, np.float64)[:, 0]
+    for finger in range(4):
+        precision = np.asarray(prior.precision[finger], np.float64)
+        middle, last = slice(3, 6), slice(6, 9)
+        bent = flexion[3 * finger + 1] * np.deg2rad(30)  # 30 degrees more than its mean
+        moved = -np.linalg.solve(precision[last, last], precision[last, middle] @ bent)
+        expected = np.rad2deg(moved @ flexion[3 * finger + 2])
+        # A little less than two thirds: the prior also pulls the joint to its own mean.
+        assert 12 < expected < 20
 
 
 def test_left_jacobian_by_finite_differences():
