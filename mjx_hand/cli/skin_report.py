@@ -71,8 +71,11 @@ def write_skin_report(
     if motion is not None:
         named[motion.name] = recorded_postures(motion, rigid)
     errors, rigids, softs, shown = {}, [], [], []
+    all_hard, all_soft = posed_skins(hand, shape, rigid, np.concatenate(list(named.values())))  # compiled once
+    first = 0
     for name, angles in named.items():
-        hard, soft = posed_skins(hand, shape, rigid, angles)
+        hard, soft = all_hard[first : first + len(angles)], all_soft[first : first + len(angles)]
+        first += len(angles)
         errors[name] = np.linalg.norm(hard - soft, axis=-1)
         if name in _SHOWN or (motion is not None and name == motion.name):
             worst = int(errors[name].mean(axis=1).argmax())

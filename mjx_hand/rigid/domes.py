@@ -93,12 +93,15 @@ def exits(
     """
     a, b, c = np.moveaxis(skin[faces] - centre, 1, 0)
     normals = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)])  # of the planes through the centre
-    sides = np.einsum("kfi,ri->krf", normals, ways)
-    volume = np.einsum("fi,fi->f", a, normals[0])
-    total = sides.sum(axis=0)
+    volume = (a * normals[0]).sum(axis=-1)
+    seen_from_inside = volume > 0
+    faces, normals, volume = faces[seen_from_inside], normals[:, seen_from_inside], volume[seen_from_inside]
+    first, second, third = sides = ways @ np.swapaxes(normals, 1, 2)  # (3, r, f)
+    total = first + second + third
     # A ray along an edge must not slip between its two triangles.
-    inside = (sides.min(axis=0) >= -1e-9 * total) & (total > 1e-12) & (volume > 0)
-    distance = np.where(inside, volume / np.where(total > 1e-12, total, 1.0), np.inf)
+    least = np.minimum(np.minimum(first, second), third)
+    inside = (least >= -1e-9 * total) & (total > 1e-12)
+    distance = np.where(inside, volume / np.where(inside, total, 1.0), np.inf)
     nearest = distance.argmin(axis=1)
     rows = np.arange(len(ways))
     shares = (sides[:, rows, nearest] / total[rows, nearest]).T
