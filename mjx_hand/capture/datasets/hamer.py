@@ -21,119 +21,20 @@ as are the bones. The frame rate is the video's: give `fps`.
 """
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from mjx_hand.capture.datasets.contents import PICKLES, WHOLE, plain, read_contents, unwrapped
+from mjx_hand.capture.datasets.contents import PICKLES, WHOLE, read_contents, unwrapped
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
+from mjx_hand.capture.datasets.estimated_hands import EstimatedHand, hands_in, is_entry, is_list_of_hands
 from mjx_hand.capture.datasets.joint_places import subject_with_joints
 from mjx_hand.capture.datasets.mano_motion import LONGEST, chosen_side, frame_rate, mano_motion, recorded, some
 from mjx_hand.capture.datasets.subject import one_shape, subject_of
 from mjx_hand.errors import InputError
 from mjx_hand.motion import Motion
-from mjx_hand.motion.layout import numbers
-
-Array = np.ndarray
-_PARAMETERS = ("global_orient", "hand_pose", "betas")
-_MIRROR = np.diag([-1.0, 1, 1])
-
-
-@dataclass(frozen=True)
-class _Hand:
-    """One hand in one image: its own rotations (wrist first), shape, translation, and joints (NaN if not there)."""
-
-    side: str
-    rotations: Float[Array, "16 3 3"]
-    shape: Float[Array, "10"]
-    translation: Float[Array, "3"]
-    joints: Float[Array, "21 3"]
-
-    def row(self) -> Float[Array, "220"]:
-        return np.concatenate([self.rotations.ravel(), self.shape, self.translation, self.joints.ravel()])
-
-
-def _parameters(entry: Any) -> dict[str, Any]:
-    """The named values of HaMeR's dictionary, its parameters among them; nothing where it is none."""
-    if not isinstance(entry, dict):
-        return {}
-    inner = unwrapped(entry.get("pred_mano_params"))
-    values = {**entry, **inner} if isinstance(inner, dict) else entry
-    return values if all(name in values for name in _PARAMETERS) else {}
-
-
-def _is_mini(entry: Any) -> bool:
-    return isinstance(entry, list) and bool(entry) and all(isinstance(e, dict) and "is_right" in e for e in entry)
-
-
-def _hands(where: str, entry: Any) -> list[_Hand]:
-    """The hands in an image's entry."""
-    entry = unwrapped(entry)
-    if entry is None or (isinstance(entry, list) and not entry):
-        return []
-    if _is_mini(entry):
-        seen = [e for e in entry if isinstance(e.get("wilor_preds"), dict)]
-        return [hand for e in seen for hand in _mini(where, e)]
-    values = _parameters(entry)
-    if not values:
-        raise InputError(f"{where}: holds no {', '.join(_PARAMETERS)}; save the model's own output")
-    right = plain(where, "right", values.get("right", values.get("is_right")))
-    count = right.size
-    right = numbers(where, {"right": right.reshape(count)}, {"right": (count,)})["right"]
-    found = _found(where, values)
-    layout = {"global_orient": (count, 1, 3, 3), "hand_pose": (count, 15, 3, 3)}
-    rotations = np.concatenate(list(numbers(where, found, layout, finite=False).values()), axis=1).astype(float)
-    mirror = np.where(right.reshape(-1, 1, 1) > 0.5, np.eye(3), _MIRROR)
-    rotations = mirror[:, None] @ rotations @ mirror[:, None]
-    return _made(where, found, right, rotations, mirror)
-
-
-def _mini(where: str, entry: dict[str, Any]) -> list[_Hand]:
-    right = plain(where, "is_right", entry["is_right"])
-    if right.size != 1 or right.dtype.kind not in "fiub":
-        raise InputError(f"{where}: is_right is no single number")
-    found = _found(where, entry["wilor_preds"])
-    layout = {"global_orient": (1, 1, 3), "hand_pose": (1, 15, 3)}
-    vectors = np.concatenate(list(numbers(where, found, layout, finite=False).values()), axis=1).astype(float)
-    finite = np.isfinite(vectors).all()
-    rotations = Rotation.from_rotvec(vectors[0]).as_matrix() if finite else np.full((16, 3, 3), np.nan)
-    return _made(where, found, right, rotations[None], np.eye(3)[None])
-
-
-def _found(where: str, values: dict[str, Any]) -> dict[str, Array]:
-    names = (*_PARAMETERS, "pred_cam_t_full", "pred_keypoints_3d")
-    found = {name: plain(where, name, values[name]) for name in names if name in values}
-    if "pred_cam_t_full" not in found:
-        raise InputError(f"{where}: has no pred_cam_t_full; save it too (pred_cam_t is of the crop, not of the image)")
-    return found
-
-
-def _made(where: str, found: dict[str, Array], right: Array, rotations: Array, mirror: Array) -> list[_Hand]:
-    count = len(rotations)
-    values = numbers(where, found, {"betas": (count, 10), "pred_cam_t_full": (count, 3)}, finite=False)
-    joints = np.full((count, 21, 3), np.nan)
-    if "pred_keypoints_3d" in found:
-        joints = (
-            numbers(where, found, {"pred_keypoints_3d": (count, 21, 3)}, finite=False)["pred_keypoints_3d"] @ mirror
-        )
-    given = rotations[np.isfinite(rotations).all(axis=(1, 2, 3))]
-    off = np.abs(given @ np.swapaxes(given, -1, -2) - np.eye(3)).max(initial=0)
-    if off > 0.01 or (np.linalg.det(given) < 0).any():  # half precision is off by 0.002
-        raise InputError(f"{where}: global_orient or hand_pose holds matrices that are not rotations")
-    return [
-        _Hand(
-            side="right" if right.ravel()[k] > 0.5 else "left",
-            rotations=rotations[k],
-            shape=values["betas"][k].astype(float),
-            translation=values["pred_cam_t_full"][k].astype(float),
-            joints=joints[k].astype(float),
-        )
-        for k in range(count)
-    ]
 
 
 def _files(path: Path) -> list[tuple[int | None, Path]]:
@@ -151,28 +52,25 @@ def _recognises(path: Path, contents: Contents) -> bool:
     if path.is_dir():
         files = _files(path)
         named = bool(files) and all(number is not None for number, _ in files)
-        return named and _is_entry(_entry(read_contents(files[0][1])))
+        entries = (unwrapped(_entry(read_contents(file))) for _, file in files)
+        with_hands = (entry for entry in entries if not (entry is None or (isinstance(entry, list) and not entry)))
+        return named and is_entry(next(with_hands, None))
     entry = unwrapped(_entry(contents))
-    if isinstance(entry, list) and not _is_mini(entry):
-        return any(_is_entry(one) for one in entry)
-    return _is_entry(entry)
+    if isinstance(entry, list) and not is_list_of_hands(entry):
+        return any(is_entry(one) for one in entry)
+    return is_entry(entry)
 
 
-def _is_entry(entry: Any) -> bool:
-    entry = unwrapped(entry)
-    return _is_mini(entry) or bool(_parameters(entry))
-
-
-def _images(path: Path, contents: Contents) -> dict[int, list[_Hand]]:
+def _images(path: Path, contents: Contents) -> dict[int, list[EstimatedHand]]:
     """The hands in each image, by its number."""
     if not path.is_dir():
         entry = unwrapped(_entry(contents))
-        listed = entry if isinstance(entry, list) and not _is_mini(entry) else [entry]
-        return {k: _hands(f"{path}: image {k}", one) for k, one in enumerate(listed)}
+        listed = entry if isinstance(entry, list) and not is_list_of_hands(entry) else [entry]
+        return {k: hands_in(f"{path}: image {k}", one) for k, one in enumerate(listed)}
     files = {number: file for number, file in _files(path) if number is not None}
     if len(files) < len(_files(path)) or max(files) - min(files) > LONGEST:
         raise InputError(f"{path}: two files have one number, or numbers are wild; name them by image, as 000001.npz")
-    return {number: _hands(str(file), _entry(read_contents(file))) for number, file in files.items()}
+    return {number: hands_in(str(file), _entry(read_contents(file))) for number, file in files.items()}
 
 
 def _read(path: Path, contents: Contents, request: Request) -> Motion:

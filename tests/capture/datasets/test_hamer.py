@@ -109,6 +109,13 @@ def test_a_list_of_images_is_a_video_and_empty_ones_are_gaps(tmp_path):
     np.testing.assert_allclose(motion.wrist_position[[1, 3]], seen("right")[:2, 0], atol=1e-9)
 
 
+def test_images_before_the_hand_comes_are_gaps_of_a_folder_too(tmp_path):
+    folder = write_folder(tmp_path, "mini", numbers=tuple(range(2, 8)))
+    np.save(folder / "0.npy", np.array([], dtype=object))
+    motion = load_motion(folder, fps=30)
+    assert motion.valid.tolist() == [False, False, True, True, True, True, True, True]
+
+
 def test_numbers_left_out_are_gaps(tmp_path):
     motion = load_motion(write_folder(tmp_path, "npz", numbers=(3, 4, 6, 7, 8, 10)), fps=30)
     assert np.flatnonzero(~motion.valid).tolist() == [2, 6]
