@@ -25,14 +25,13 @@ _ITERATIONS = 30
 _LEAST_STIFFNESS = 1e-9  # of a number that nothing holds
 _OUTLIER = np.radians(5.0)  # error of a frame from which on its pull grows no more
 
-# The prior: how far a joint is from its anatomical axes, one standard deviation, against the error that all frames of
-# a recording may share, which no number of frames averages out.
-_SHARED_ERROR = np.radians(0.5)
-_TURN, _SKEW, _REST = np.radians(30.0), np.radians(8.0), np.radians(20.0)
-# How far it may be at most. Axes that turn by less than 45 degrees stay nearest to their own anatomical axis, so that a
-# base joint's two cannot change places; one that turns by less than 90 cannot change its sign.
-_FARTHEST_TURN = {1: np.radians(80.0), 2: np.radians(40.0)}
-_FARTHEST_SKEW, _FARTHEST_REST = np.radians(8.0), np.radians(45.0)
+# The prior (rad, one standard deviation): how far a joint's axes are turned from the anatomical ones, opened from their
+# angle, and turned at rest, against the error that all frames may share, which no number of frames averages out.
+_TURN, _SKEW, _REST, _SHARED_ERROR = np.radians([45.0, 15.0, 45.0, 0.5])
+# How far it may be at most. Axes that turn by less than 45 degrees, half the skew included, stay nearest to their own
+# anatomical axis, so that a base joint's two cannot change places; one that turns by less than 90 keeps its sign.
+_FARTHEST_TURN = {1: np.radians(80.0), 2: np.radians(36.0)}
+_FARTHEST_SKEW, _FARTHEST_REST = np.radians(16.0), np.radians(45.0)
 
 _HINGES_OF = [[h for h in range(NUM_HINGES) if HINGE_LINKS[h] == joint + 1] for joint in range(NUM_BALL_JOINTS)]
 
@@ -129,23 +128,29 @@ def _fit(
             off = asked - kind.nearest(asked, joint_axes)
             return off.reshape(-1, 9) / jnp.sqrt(2.0), _SHARED_ERROR * numbers / spread
 
-        def cost(free: Float[Array, "p"]) -> Float[Array, ""]:
-            off, moved = residuals(free)
+        def cost(off: Float[Array, "t 9"], moved: Float[Array, "p"]) -> Float[Array, ""]:
             robust = jnp.sqrt(1 + jnp.sum(off**2, axis=-1) / _OUTLIER**2) - 1
             return 2 * _OUTLIER**2 * (weight @ robust) + moved @ moved
 
-        def iterate(_: Array, state: tuple[Array, Array]) -> tuple[Array, Array]:
-            free, damping = state
-            (off, moved), (off_slope, moved_slope) = residuals(free), jax.jacfwd(residuals)(free)
+        def linearised(free: Float[Array, "p"]) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+            found = residuals(free)
+            return found, found
+
+        def iterate(_: Array, state: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+            free, value, damping = state
+            (off_slope, moved_slope), (off, moved) = jax.jacfwd(linearised, has_aux=True)(free)
             pull = weight / jnp.sqrt(1 + jnp.sum(off**2, axis=-1) / _OUTLIER**2)
             normal = jnp.einsum("t,tap,taq->pq", pull, off_slope, off_slope) + moved_slope.T @ moved_slope
             slope = jnp.einsum("t,tap,ta->p", pull, off_slope, off) + moved_slope.T @ moved
             damped = normal + jnp.diag(damping * jnp.diag(normal) + _LEAST_STIFFNESS)
             tried = free - jnp.linalg.solve(damped, slope)
-            better = cost(tried) < cost(free)
-            return jax.lax.select(better, tried, free), damping * jnp.where(better, 0.3, 5.0)
+            reached = cost(*residuals(tried))
+            better = reached < value
+            chosen = jax.lax.select(better, tried, free)
+            return chosen, jnp.minimum(reached, value), damping * jnp.where(better, 0.3, 5.0)
 
-        free, _damping = jax.lax.fori_loop(0, _ITERATIONS, iterate, (jnp.zeros(kind.size), jnp.asarray(1e-2)))
-        return kind.joint(bounded(free), prior)
+        begin = jnp.zeros(kind.size)
+        state = (begin, cost(*residuals(begin)), jnp.asarray(1e-2))
+        return kind.joint(bounded(jax.lax.fori_loop(0, _ITERATIONS, iterate, state)[0]), prior)
 
     return jax.vmap(solve, in_axes=(1, 0))(rotations, axes)
