@@ -78,13 +78,14 @@ def retarget(
     (joint_motion,) = retarget_many([motion], [rigid], options)  # the first call also compiled: time one that did not
     took = time.perf_counter() - first
     errors = retarget_errors(motion, joint_motion, rigid)
+    if plot is not None:
+        save_figure(joint_errors(LINKS[1:], {_told(options): np.degrees(errors.rotation[errors.valid])}), plot)
     save_joint_motion(joint_motion, out)
     _report(motion, errors, axes)
     ready = first - began - took
     compiled = f"; compiling, or loading what was compiled, took {ready:.1f} s" if ready >= 0.1 else ""
     print(f"{motion.num_frames} frames in {1e3 * took:.0f} ms ({_told(options)}){compiled}")
     if plot is not None:
-        save_figure(joint_errors(LINKS[1:], {_told(options): np.degrees(errors.rotation[errors.valid])}), plot)
         print(f"{plot}  error of each joint's rotation")
     print(f"{out}  load it with mjx_hand.motion.load_joint_motion({str(out)!r})")
     return 0
