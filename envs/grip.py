@@ -28,6 +28,7 @@ def grip_offsets(
     size: Float[Array, "3"],
     force: float | Float[Array, ""],
     gains: Gains,
+    planes: Float[Array, "h f 4"] | None = None,
 ) -> Float[Array, "t 20"]:
     """Hinge offsets (rad) that put each touching finger's last link on the object's surface and press it there.
 
@@ -44,6 +45,7 @@ def grip_offsets(
         kind, size: the object's shape.
         force: newtons.
         gains: of the position controllers that the offsets are given to.
+        planes: of a mesh (`envs.signed_distance.hull_planes`).
     """
     pads = [max(k for k, link in enumerate(rigid.capsule_links) if link == tip) for tip in TIP_LINKS]
     ends, radius = rigid.capsule_ends[jnp.array(pads)], rigid.capsule_radius[jnp.array(pads)]
@@ -59,7 +61,7 @@ def grip_offsets(
 
     def one(q: Array, rotation: Array, position: Array) -> Array:
         def distance(point: Array) -> Array:
-            return signed_distance(kind, size, rotation.T @ (point - position))
+            return signed_distance(kind, size, rotation.T @ (point - position), planes)
 
         points = pad_points(q)
         gap = jax.vmap(jax.vmap(distance))(points) - radius[:, None]

@@ -1,11 +1,16 @@
-"""Points spread over the surface of a simple object, the same ones every time, for distances between poses."""
+"""Points spread over the surface of a object, the same ones every time, for distances between poses."""
 
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial import ConvexHull
 from scipy.stats import qmc
 
+from envs.signed_distance import hull_planes
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import OBJECT_KINDS, ObjectDescription
+
+_SPARE = 8  # points on a mesh's pieces for each that is wanted
+_OFF = 1e-4  # m
 
 
 def surface_points(thing: ObjectDescription, count: int = 500) -> Float[np.ndarray, "{count} 3"]:
@@ -28,6 +33,8 @@ def surface_points(thing: ObjectDescription, count: int = 500) -> Float[np.ndarr
         return _on_cylinder(size[0], size[1], where, u, v)
     if thing.kind == "capsule":
         return _on_capsule(size[0], size[1], where, u, v)
+    if thing.kind == "mesh":
+        return _on_pieces(thing.hulls, count)
     return _on_box(size, where, u, v)
 
 
@@ -55,6 +62,35 @@ def _on_capsule(radius: float, half: float, where: np.ndarray, u: np.ndarray, v:
     ends = radius * _on_unit_sphere(u, v)
     ends[:, 2] += np.copysign(half, ends[:, 2])
     return np.where(side[:, None], tube, ends)
+
+
+def _on_pieces(hulls: np.ndarray, count: int) -> np.ndarray:
+    """On the outside of the union of convex pieces: more points than needed on every piece, less those inside another.
+
+    Raises:
+        InputError: the pieces cover each other almost wholly.
+    """
+    corners, outward = [], []
+    for hull in hulls:
+        found = ConvexHull(hull)
+        corners.append(hull[found.simplices])
+        outward.append(found.equations[:, :3])
+    corners, outward = np.concatenate(corners), np.concatenate(outward)
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    halton = qmc.Halton(d=3, scramble=False)
+    halton.fast_forward(1)
+    where, u, v = halton.random(_SPARE * count).T
+    face = np.searchsorted(np.cumsum(area) / area.sum(), where).clip(max=len(area) - 1)
+    a, b, c = np.moveaxis(corners[face], 1, 0)
+    root = np.sqrt(u)[:, None]  # equal areas of a triangle
+    points = (1 - root) * a + root * (1 - v[:, None]) * b + root * v[:, None] * c
+    # A little off their own face: pieces that were cut apart share the cut.
+    off, planes = points + _OFF * outward[face], hull_planes(hulls)
+    distance = (np.einsum("pk,hfk->phf", off, planes[..., :3]) + planes[..., 3]).max(axis=-1).min(axis=-1)
+    outside = points[distance > 0]
+    if len(outside) < count:
+        raise InputError("the mesh's convex pieces cover each other almost wholly; decompose it into fewer")
+    return outside[:count]
 
 
 def _on_box(half: np.ndarray, where: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from envs.grip import grip_offsets
 from envs.scene import NUM_WRIST, base_rotation, wrist_coordinates
+from envs.signed_distance import hull_planes
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.pytree import pytree
@@ -72,14 +73,15 @@ def make_reference(
     position = jnp.asarray(np.stack([p for _, p in relative]), jnp.float32)
 
     @jax.jit
-    def grips(angles: Array, rotation: Array, position: Array, hands: RigidHand, sizes: Array) -> Array:
-        def one(a: Array, r: Array, p: Array, hand: RigidHand, size: Array) -> Array:
-            return grip_offsets(a, (r, p), hand, kind, size, grip_force, gains)
+    def grips(angles: Array, rotation: Array, position: Array, hands: RigidHand, sizes: Array, planes: Array) -> Array:
+        def one(a: Array, r: Array, p: Array, hand: RigidHand, size: Array, planes: Array) -> Array:
+            return grip_offsets(a, (r, p), hand, kind, size, grip_force, gains, planes if kind == "mesh" else None)
 
-        return jax.vmap(one)(angles, rotation, position, hands, sizes)
+        return jax.vmap(one)(angles, rotation, position, hands, sizes, planes)
 
     if grip_force > 0:
-        grip = grips(targets[..., NUM_WRIST:], rotation, position, stack_hands(hands), sizes)
+        planes = jnp.asarray(_stacked_planes([d.object.hulls for d in demonstrations]), jnp.float32)
+        grip = grips(targets[..., NUM_WRIST:], rotation, position, stack_hands(hands), sizes, planes)
     else:
         grip = jnp.zeros_like(targets[..., NUM_WRIST:])
     grip = jnp.concatenate([jnp.zeros((*grip.shape[:2], NUM_WRIST)), grip], axis=-1)
@@ -109,6 +111,13 @@ def _anticipated(targets: Float[Array, "d t 26"], gains: Gains, fps: float) -> F
 
 def _padded(rows: np.ndarray, frames: int) -> np.ndarray:
     return np.concatenate([rows, np.repeat(rows[-1:], frames - len(rows), axis=0)])
+
+
+def _stacked_planes(hulls: Sequence[Float[np.ndarray, "_ _ 3"]]) -> Float[np.ndarray, "d h f 4"]:
+    """The planes of each demonstration's mesh, padded to one shape by repeating faces and pieces."""
+    planes = [hull_planes(pieces) for pieces in hulls]
+    pieces, faces = (max(p.shape[k] for p in planes) for k in (0, 1))
+    return np.stack([np.pad(p, ((0, pieces - len(p)), (0, faces - p.shape[1]), (0, 0)), mode="edge") for p in planes])
 
 
 def _check(demonstrations: Sequence[Demonstration]) -> None:

@@ -3,10 +3,11 @@
 import mujoco
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from mjx_hand.errors import InputError
-from mjx_hand.motion.demonstration import Demonstration, ObjectDescription
+from mjx_hand.motion.demonstration import OBJECT_KINDS, Demonstration, ObjectDescription
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.mjcf import hand_spec
 from mjx_hand.rigid.rigid_hand import RigidHand
@@ -49,8 +50,8 @@ def scene_model(
         gains: of the hand's joints.
         visual: with the hand's meshes, for pictures; without them the model is small and quick.
     """
-    if thing.kind not in _GEOM:
-        raise InputError(f"object kind {thing.kind!r} is not known; valid: {', '.join(_GEOM)}")
+    if thing.kind not in OBJECT_KINDS:
+        raise InputError(f"object kind {thing.kind!r} is not known; valid: {', '.join(OBJECT_KINDS)}")
     spec = hand_spec(rigid, base="actuated", visual=visual, gains=gains)
     spec.option.timestep = TIMESTEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -66,15 +67,28 @@ def scene_model(
     _add_ground(spec, support, support_position, thing.friction)
     body = spec.worldbody.add_body(name=OBJECT)
     body.add_freejoint(name=OBJECT)
-    geom = body.add_geom(
-        name=OBJECT, type=_GEOM[thing.kind], size=thing.size, mass=thing.mass, rgba=(0.9, 0.35, 0.2, 1.0)
-    )
-    geom.contype, geom.conaffinity = _OBJECT_MEETS
-    _contact(geom, thing.friction)
+    for geom in _object_geoms(spec, body, thing):
+        geom.rgba = (0.9, 0.35, 0.2, 1.0)
+        geom.contype, geom.conaffinity = _OBJECT_MEETS
+        _contact(geom, thing.friction)
     # MJX alone reads these: it works every possible contact out, and is a tenth as quick without a cap.
     for name, most in MJX_CAPS.items():
         spec.add_numeric(name=name, data=[most])
     return spec.compile()
+
+
+def _object_geoms(spec: mujoco.MjSpec, body: mujoco.MjsBody, thing: ObjectDescription) -> list[mujoco.MjsGeom]:
+    """The object's geoms with their masses: one, or one a convex piece of a mesh."""
+    if thing.kind != "mesh":
+        return [body.add_geom(name=OBJECT, type=_GEOM[thing.kind], size=thing.size, mass=thing.mass)]
+    volumes = np.array([ConvexHull(hull).volume for hull in thing.hulls])
+    geoms = []
+    for k, (hull, share) in enumerate(zip(thing.hulls, volumes / volumes.sum(), strict=True)):
+        name = f"{OBJECT}{k}"
+        spec.add_mesh(name=name).uservert = np.unique(hull, axis=0).ravel()
+        mass = thing.mass * share
+        geoms.append(body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, mass=mass))
+    return geoms
 
 
 def _contact(geom: mujoco.MjsGeom, friction: float, condim: int = 3) -> None:

@@ -3,17 +3,26 @@
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from scipy.spatial import ConvexHull
 
 from mjx_hand.errors import InputError
 
 
-def signed_distance(kind: str, size: Float[Array, "*#b 3"], point: Float[Array, "*#b 3"]) -> Float[Array, "*#b"]:
+def signed_distance(
+    kind: str,
+    size: Float[Array, "*#b 3"],
+    point: Float[Array, "*#b 3"],
+    planes: Float[Array | np.ndarray, "h f 4"] | None = None,
+) -> Float[Array, "*#b"]:
     """Distance (m) from a point in the object's frame to its surface, negative inside.
 
+    Of a mesh it is the distance to the planes of the nearest piece: less than the true one outside edges and corners.
+
     Args:
-        kind: "box", "sphere", "cylinder" or "capsule" (sizes as in `motion.ObjectDescription`).
+        kind: "box", "sphere", "cylinder", "capsule" or "mesh" (sizes as in `motion.ObjectDescription`).
         size: the object's size (m), broadcast against the points.
         point: in the object's frame (m).
+        planes: of a mesh, those of its pieces (`hull_planes`).
     """
     if kind == "box":
         return _rounded(jnp.abs(point) - size)
@@ -26,7 +35,20 @@ def signed_distance(kind: str, size: Float[Array, "*#b 3"], point: Float[Array, 
     if kind == "capsule":
         beyond = jnp.maximum(jnp.abs(point[..., 2]) - size[..., 1], 0.0)
         return _norm(jnp.concatenate([point[..., :2], beyond[..., None]], axis=-1)) - size[..., 0]
-    raise InputError(f"object kind {kind!r} is not known; valid: box, sphere, cylinder, capsule")
+    if kind == "mesh" and planes is not None:
+        beyond = jnp.einsum("...k,hfk->...hf", point, planes[..., :3]) + planes[..., 3]
+        return beyond.max(axis=-1).min(axis=-1)
+    raise InputError(f"object kind {kind!r} is not known; valid: box, sphere, cylinder, capsule, mesh with its planes")
+
+
+def hull_planes(hulls: Float[np.ndarray, "h v 3"]) -> Float[np.ndarray, "h f 4"]:
+    """The faces' planes of convex pieces, given by their corners: n x + d is the distance outwards (m).
+
+    Pieces with fewer faces repeat one.
+    """
+    faces = [np.unique(np.round(ConvexHull(np.unique(hull, axis=0)).equations, 9), axis=0) for hull in hulls]
+    most = max(map(len, faces), default=0)
+    return np.array([np.pad(rows, ((0, most - len(rows)), (0, 0)), mode="edge") for rows in faces]).reshape(-1, most, 4)
 
 
 def half_extents(kind: str, size: Float[Array | np.ndarray, "*b 3"]) -> Float[Array, "*b 3"]:

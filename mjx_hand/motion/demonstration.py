@@ -1,5 +1,6 @@
 """`Demonstration`: a hand and an object in motion, ready for a physics twin to replay."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +14,12 @@ from mjx_hand.motion.layout import numbers, text
 from mjx_hand.pytree import pytree, static
 
 SCHEMA = "mjx-hand/demonstration/2"
-OBJECT_KINDS = ("box", "sphere", "cylinder", "capsule")
+OBJECT_KINDS = ("box", "sphere", "cylinder", "capsule", "mesh")
 _LAYOUT: dict[str, tuple[int | str, ...]] = {
     "object_size": (3,),
     "object_mass": (),
     "object_friction": (),
+    "object_hulls": ("h", "v", 3),
     "support": ("b", 3),
     "support_position": ("b", 3),
     "shape": ("s",),
@@ -30,15 +32,19 @@ class ObjectDescription:
 
     Attributes:
         size: half extents of a box; (radius, 0, 0) of a sphere; (radius, half height, 0) of a cylinder along z;
-            (radius, half length without the round ends, 0) of a capsule along z.
+            (radius, half length without the round ends, 0) of a capsule along z; of a mesh, how far it reaches from
+            its frame's origin along each axis.
         mass: uniform density is assumed.
         friction: sliding coefficient.
+        hulls: of a mesh, the corners of its convex pieces in the object's frame (`envs.convex_pieces`); shorter rows
+            repeat a corner. Empty for the other kinds.
         kind: one of `OBJECT_KINDS`.
     """
 
     size: Float[np.ndarray, "3"]
     mass: float
     friction: float
+    hulls: Float[np.ndarray, "h v 3"] = dataclasses.field(default_factory=lambda: np.zeros((0, 0, 3)))
     kind: str = static()
 
 
@@ -90,6 +96,7 @@ def save_demonstration(demonstration: Demonstration, path: str | Path) -> None:
             "object_size": d.object.size,
             "object_mass": d.object.mass,
             "object_friction": d.object.friction,
+            "object_hulls": d.object.hulls,
             "support": d.support,
             "support_position": d.support_position,
             "shape": d.shape,
@@ -112,6 +119,10 @@ def load_demonstration(path: str | Path) -> Demonstration:
     kind = text(path, a, "object_kind")
     if kind not in OBJECT_KINDS:
         raise InputError(f"{path}: object_kind is {kind!r}; known: {', '.join(OBJECT_KINDS)}")
+    if (kind == "mesh") != (n["object_hulls"].size > 0):
+        raise InputError(
+            f"{path}: object_kind is {kind!r} with {len(n['object_hulls'])} convex pieces; only a mesh has"
+        )
     return Demonstration(
         motion=motion,
         object_pose=n["object_pose"],
@@ -120,6 +131,7 @@ def load_demonstration(path: str | Path) -> Demonstration:
             size=n["object_size"],
             mass=float(n["object_mass"]),
             friction=float(n["object_friction"]),
+            hulls=n["object_hulls"],
         ),
         support=n["support"],
         support_position=n["support_position"],

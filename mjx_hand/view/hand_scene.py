@@ -121,6 +121,7 @@ def object_mesh(description: ObjectDescription) -> tuple[Array, Array]:
         "sphere": lambda: trimesh.creation.icosphere(subdivisions=3, radius=a),
         "cylinder": lambda: trimesh.creation.cylinder(radius=a, height=2 * b, sections=48),
         "capsule": lambda: trimesh.creation.capsule(radius=a, height=2 * b, count=[32, 32]),
+        "mesh": lambda: trimesh.util.concatenate([trimesh.convex.convex_hull(hull) for hull in description.hulls]),
     }[description.kind]()
     if description.kind == "capsule":
         mesh.apply_translation(-mesh.bounds.mean(axis=0))

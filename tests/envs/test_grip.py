@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from envs.grip import grip_offsets
 from envs.scene import NUM_WRIST, OBJECT, demonstration_model
+from envs.signed_distance import hull_planes
 from mjx_hand.hand.joints import HINGES
 from mjx_hand.motion.demonstration import OBJECT_KINDS
 from mjx_hand.rigid.gains import Gains
@@ -86,8 +87,10 @@ def test_every_kind_of_object_has_finite_offsets(demonstrations, hands, in_hand)
     hand = jax.tree.map(lambda leaf: leaf[0], stack_hands(hands[:1]))
     angles = jnp.asarray(d.motion.angles[-2:], jnp.float32)
     where = tuple(leaf[-2:] for leaf in in_hand)
+    corners = 0.017 * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    planes = jnp.asarray(hull_planes(corners[None]), jnp.float32)
     for kind in OBJECT_KINDS:
-        found = grip_offsets(angles, where, hand, kind, jnp.full(3, 0.017), 8.0, Gains())
+        found = grip_offsets(angles, where, hand, kind, jnp.full(3, 0.017), 8.0, Gains(), planes)
         assert np.isfinite(np.asarray(found)).all()
         assert np.abs(np.asarray(found)[:, THUMB]).max() > 0.01
 

@@ -110,5 +110,5 @@ def test_a_demonstrations_poses_are_reached_by_the_scene(model, demonstrations, 
 
 def test_an_unknown_kind_of_object_is_refused(hands):
     cone = ObjectDescription(kind="cone", size=np.ones(3), mass=0.1, friction=1.0)
-    with pytest.raises(InputError, match=r"'cone' is not known; valid: box, sphere, cylinder, capsule"):
+    with pytest.raises(InputError, match=r"'cone' is not known; valid: box, sphere, cylinder, capsule, mesh"):
         scene_model(hands[0], cone, np.ones((1, 3)), np.zeros((1, 3)), np.eye(3))

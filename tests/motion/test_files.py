@@ -45,7 +45,9 @@ def demonstration(motion) -> Demonstration:
     return Demonstration(
         motion=motion,
         object_pose=np.tile([0.1, 0.2, 0.3, 1, 0, 0, 0], (motion.num_frames, 1)),
-        object=ObjectDescription(size=np.array([0.03, 0.03, 0.03]), mass=0.1, friction=0.9, kind="box"),
+        object=ObjectDescription(
+            size=np.array([0.03, 0.03, 0.03]), mass=0.1, friction=0.9, hulls=np.full((2, 5, 3), 0.03), kind="mesh"
+        ),
         support=np.array([[0.1, 0.1, 0.01], [0.01, 0.01, 0.02]]),
         support_position=np.array([[0.0, 0.0, 0.01], [0.05, 0.0, 0.02]]),
         shape=np.zeros(10),
