@@ -9,7 +9,7 @@ from mjx_hand.errors import InputError
 
 Array = np.ndarray
 Colour = tuple[int, int, int]
-Mesh = tuple[Float[Array, "v 3"], Int[Array, "f 3"]]  # vertices (m) and triangles
+Mesh = tuple[Array, Array]  # vertices (v, 3), m, and triangles (f, 3): every mesh has its own v and f
 
 
 @dataclass(frozen=True)
@@ -132,8 +132,8 @@ def check_scene(scene: Scene) -> Scene:
     """Return `scene` if it can be shown.
 
     Raises:
-        InputError: it has no layers or frames, they or the curves differ in length, names repeat, or the rate is not
-            a positive number.
+        InputError: it has no layers or frames, they or the curves differ in length, names repeat, nothing is ever seen,
+            or the rate is not a positive number.
     """
     if not scene.layers or scene.num_frames == 0:
         raise InputError(f"{scene.title}: nothing to show; give at least one layer of at least one frame")
@@ -148,6 +148,8 @@ def check_scene(scene: Scene) -> Scene:
         raise InputError(f"{scene.title}: fps is {scene.fps}, expected a positive number")
     if scene.up not in ("+x", "-x", "+y", "-y", "+z", "-z"):
         raise InputError(f"{scene.title}: up is {scene.up!r}, expected a signed axis such as '+z'")
+    if not np.isfinite(positions(scene)).all(axis=-1).any():
+        raise InputError(f"{scene.title}: nothing is seen in any frame")
     return scene
 
 

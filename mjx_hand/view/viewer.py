@@ -102,7 +102,8 @@ class Viewer:
         """Stop serving."""
         self._closed.set()
         self._clock.join()
-        self.server.stop()
+        with contextlib.redirect_stdout(io.StringIO()):  # viser says that it stopped
+            self.server.stop()
 
     def wait(self) -> None:
         """Serve until the process is interrupted (Ctrl-C)."""
@@ -137,9 +138,10 @@ class Viewer:
     def _set_stage(self) -> None:
         """Lights, the ground, and where the camera begins."""
         server, scene = self.server, self.scene
-        server.gui.configure_theme(control_layout="collapsible", show_logo=False, show_share_button=False)
+        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        server.gui.main_panel.dock_right()
         server.scene.set_up_direction(scene.up)  # type: ignore[arg-type]
-        up = np.array(_AXES[scene.up[1]]) * (1 if scene.up[0] == "+" else -1)
+        up = np.array(_AXES[scene.up[1]], float) * (1 if scene.up[0] == "+" else -1)
         low, high = _bounds(scene)
         centre, size = (low + high) / 2, float(np.linalg.norm(high - low))
         height = scene.ground if scene.ground is not None else float(min(low @ up, high @ up)) - 0.02
@@ -245,8 +247,6 @@ def _bounds(scene: Scene) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"
     """The box in which nearly all of the motion happens, with room for fingers around their joints."""
     at = positions(scene).reshape(-1, 3)
     at = at[np.isfinite(at).all(axis=1)]
-    if len(at) == 0:
-        raise InputError(f"{scene.title}: nothing is seen in any frame")
     low, high = np.quantile(at, [0.02, 0.98], axis=0)
     return low - 0.02, high + 0.02
 
