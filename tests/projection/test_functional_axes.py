@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jax import Array
 from scipy.spatial.transform import Rotation
 
 from mjx_hand import fit_functional_axes
@@ -40,7 +41,7 @@ def motion_angles(rigid: RigidHand, scale: float = 1.0, seed: int = 1) -> np.nda
     phase, speed = rng.uniform(0, 2 * np.pi, 20), rng.uniform(1, 3, 20)
     swing = np.sin(speed * np.linspace(0, 2 * np.pi, FRAMES)[:, None] + phase)
     middle, half = (rigid.hinge_upper + rigid.hinge_lower) / 2, (rigid.hinge_upper - rigid.hinge_lower) / 2
-    return scale * (middle + 0.8 * half * swing)
+    return np.asarray(scale * (middle + 0.8 * half * swing))
 
 
 def rotations_of(rigid: RigidHand, angles: np.ndarray) -> np.ndarray:
@@ -53,7 +54,7 @@ def errors(rigid: RigidHand, rotations: np.ndarray) -> np.ndarray:
     return np.degrees(geodesic_angle(recorded, joint_rotations(project(recorded, rigid), rigid)))
 
 
-def apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def apart(a: np.ndarray | Array, b: np.ndarray | Array) -> np.ndarray:
     """Degrees between axes, sign and all."""
     return np.degrees(np.arccos(np.clip((np.asarray(a) * np.asarray(b)).sum(axis=-1), -1, 1)))
 
