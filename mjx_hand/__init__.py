@@ -13,6 +13,7 @@ from mjx_hand.capture.load import load_motion
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
 from mjx_hand.projection import fit_functional_axes, project
+from mjx_hand.retarget.dataset import retarget_dataset
 from mjx_hand.retarget.sequence import retarget_sequence
 from mjx_hand.rigid.build import build_rigid_hand
 from mjx_hand.rigid.rigid_hand import joint_rotations
@@ -28,5 +29,6 @@ __all__ = [
     "load_hand",
     "load_motion",
     "project",
+    "retarget_dataset",
     "retarget_sequence",
 ]
