@@ -14,6 +14,7 @@ from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
 from mjx_hand.projection import fit_functional_axes, project
 from mjx_hand.retarget.dataset import retarget_dataset
+from mjx_hand.retarget.options import RetargetOptions
 from mjx_hand.retarget.sequence import retarget_sequence
 from mjx_hand.rigid.build import build_rigid_hand
 from mjx_hand.rigid.rigid_hand import joint_rotations
@@ -22,6 +23,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "InputError",
+    "RetargetOptions",
     "__version__",
     "build_rigid_hand",
     "fit_functional_axes",
