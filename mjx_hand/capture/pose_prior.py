@@ -15,8 +15,8 @@ from mjx_hand.pytree import pytree
 FINGER = ((25.0, 40.0, 12.0, 8.0), (30.0, 40.0, 4.0, 5.0), (20.0, 30.0, 2.0, 2.0))
 THUMB = ((10.0, 25.0, 20.0, 8.0), (15.0, 25.0, 6.0, 6.0), (15.0, 30.0, 3.0, 3.0))
 # A finger's two outer joints bend together, pulled by the same tendons: the DIP joint two thirds of the PIP joint
-# (Rijpkema and Girard 1991, https://doi.org/10.1145/122718.122754). In grasps, where contact bends the tip, it is a third
-# to all of it, hence the wide deviation: it takes a fifth off the errors of hidden tips, and tighter ones add to them.
+# (Rijpkema and Girard 1991, https://doi.org/10.1145/122718.122754). In grasps, where contact bends the tip, it is a
+# third to all of it, hence the wide deviation: it takes a fifth off the errors of hidden tips, a tighter one adds.
 DIP_FOR_PIP = 2 / 3
 DIP_DEVIATION = 20.0  # degrees
 

@@ -84,7 +84,7 @@ def _hand(axes: Axes3D, vertices: Array, faces: Array, side: str) -> None:
     colours = np.concatenate([np.clip(SKIN * shade[:, None], 0, 1), np.full((len(faces), 1), 0.55)], axis=1)
     axes.add_collection3d(Poly3DCollection(_plot_axes(triangles), facecolors=colours, edgecolors="none"))
     points = _plot_axes(vertices)
-    middle, reach = (points.max(axis=0) + points.min(axis=0)) / 2, 0.5 * np.ptp(points, axis=0).max()
+    middle, reach = (points.max(axis=0) + points.min(axis=0)) / 2, 0.59 * np.ptp(points, axis=0).max()
     for set_limits, centre in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), middle, strict=True):
         set_limits(centre - reach, centre + reach)
     axes.set_box_aspect((1, 1, 1), zoom=2)
@@ -106,12 +106,13 @@ def _markers(axes: Axes3D, observed: Array, predicted: Array) -> None:
 
 
 def _bars(axes: Axes, report: FitReport) -> None:
+    """Each marker's error; medians, because the RMS of a marker with one ghost speaks of the ghost alone."""
     millimetres = [1000 * report.distance[seen, m] for m, seen in enumerate(report.seen.T)]
     rows = np.arange(len(report.names))
     axes.barh(
         rows, [np.percentile(d, 95) if d.size else 0.0 for d in millimetres], color=BLUE, alpha=0.25, label="95 %"
     )
-    axes.barh(rows, 1000 * report.marker_rms, color=BLUE, height=0.5, label="RMS")
+    axes.barh(rows, [np.median(d) if d.size else 0.0 for d in millimetres], color=BLUE, height=0.5, label="median")
     axes.set_yticks(rows, report.names, fontsize=8)
     axes.invert_yaxis()
     axes.set_xlabel("distance from the fitted hand (mm)")
