@@ -7,7 +7,7 @@ from PIL import Image
 
 from envs.demonstrations import dataset
 from envs.demonstrations.__main__ import main, settings_of
-from envs.demonstrations.dataset import YIELD, SetSettings, set_folder
+from envs.demonstrations.dataset import PARTS, YIELD, SetSettings, set_folder
 from envs.demonstrations.quality import check_part
 from envs.demonstrations.record import load_truth, save_truth
 from envs.grasps import grasp_type
@@ -22,14 +22,15 @@ def test_a_set_is_shown(set_path, set_root, capsys):
     main([*ARGUMENTS, f"demonstrations={set_root}"])
     said = capsys.readouterr().out
     tallies = json.loads((set_path / YIELD).read_text())
-    assert f"│ {sum(tallies['train'].values())} │" in said.replace("  ", " ").replace("  ", " ")
+    cells = [line.replace("│", " ").split() for line in said.splitlines()]
+    assert ["attempts", *(str(sum(tallies[part].values())) for part in PARTS)] in cells
     for words in ("attempts", "held", "hinges from the truth", str(set_path / "sheet.png")):
         assert words in said
     picture = np.asarray(Image.open(set_path / "sheet.png"), float)
     assert picture.shape == (2 * 240, 6 * 240, 3)
-    cells = picture.reshape(2, 240, 6, 240, 3)
-    assert cells.std(axis=(1, 3)).min() > 5  # no cell is empty
-    assert np.abs(np.diff(cells, axis=2)).mean(axis=(1, 3, 4)).min() > 1  # each moment differs from the one before
+    frames = picture.reshape(2, 240, 6, 240, 3)
+    assert frames.std(axis=(1, 3)).min() > 5  # no cell is empty
+    assert np.abs(np.diff(frames, axis=2)).mean(axis=(1, 3, 4)).min() > 1  # each moment differs from the one before
 
 
 def test_settings_come_from_the_experiment_and_its_overrides():
