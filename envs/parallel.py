@@ -3,9 +3,25 @@
 import jax
 import jax.numpy as jnp
 from brax.envs.base import Env, State
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
-from envs.tracking import TrackingEnv
+from envs.tracking import TrackingEnv, Twin, twin_of
+from mjx_hand.pytree import pytree
+
+
+@pytree
+class Caught:
+    """What went before the last step of a world in which its simulation diverged.
+
+    Attributes:
+        count: how many steps of this world have diverged; 0 means that the rest says nothing.
+        twin: the state before the step.
+        action: what the policy did.
+    """
+
+    count: Int[Array, "*b"]
+    twin: Twin
+    action: Float[Array, "*b 26"]
 
 
 class ParallelEnv(Env):
@@ -13,10 +29,13 @@ class ParallelEnv(Env):
 
     Brax's own wrappers restart a world at the state of its very first reset. Here every restart draws a new
     demonstration and a new frame, which costs one look-up in the environment's table of starts.
+
+    With `guard`, `info["caught"]` holds the `Caught` of each world.
     """
 
-    def __init__(self, env: TrackingEnv):
+    def __init__(self, env: TrackingEnv, guard: bool = False):
         self.env = env
+        self.guard = guard
 
     @property
     def action_size(self) -> int:
@@ -47,6 +66,9 @@ class ParallelEnv(Env):
             "episode_done": zero,
             "episode_metrics": dict.fromkeys(("sum_reward", "length", *state.metrics), zero),
         }
+        if self.guard:
+            count, idle = jnp.zeros((), jnp.int32), jnp.zeros(self.action_size)
+            info["caught"] = Caught(count=count, twin=twin_of(state), action=idle)
         return state.replace(info=info)  # type: ignore[attr-defined]
 
     def _step(self, state: State, action: Float[Array, "26"]) -> State:
@@ -66,6 +88,12 @@ class ParallelEnv(Env):
             "episode_done": stepped.done,
             "episode_metrics": {name: sums[name] * going + value for name, value in terms.items()},
         }
+
+        if self.guard:
+            before: Caught = state.info["caught"]
+            bad = stepped.metrics["unstable"] > 0
+            now_caught = Caught(count=before.count + 1, twin=twin_of(state), action=action)
+            info["caught"] = jax.tree.map(lambda new, old: jnp.where(bad, new, old), now_caught, before)
 
         def choose(new: Array, old: Array) -> Array:
             return jnp.where(over, new, old)

@@ -36,9 +36,9 @@ class Twin:
     """A world's state: physics, which demonstration it follows, how far it is, and the residual so far."""
 
     physics: PhysicsState
-    demonstration: Int[Array, ""]
-    frame: Int[Array, ""]
-    residual: Float[Array, "26"]
+    demonstration: Int[Array, "*b"]
+    frame: Int[Array, "*b"]
+    residual: Float[Array, "*b 26"]
 
 
 def twin_of(state: State) -> Twin:
@@ -131,11 +131,8 @@ class TrackingEnv(Env):
         twin = twin_of(state)
         task = self.task
         action = jnp.clip(action, -1.0, 1.0)
-        residual = task.smoothing * twin.residual + (1 - task.smoothing) * residual_scale(task) * action
-        length = self.reference.length[twin.demonstration]
-        frame = jnp.minimum(twin.frame + 1, length - 1)
-        target = self.reference.controls[twin.demonstration, frame] + residual
-        physics = self.engine.step(twin.physics, jnp.clip(target, self._low, self._high))
+        frame, residual, targets = self.command(twin, action)
+        physics = self.engine.step(twin.physics, targets)
         twin = Twin(physics=physics, demonstration=twin.demonstration, frame=frame, residual=residual)
 
         position, rotation = self._errors(twin)
@@ -145,7 +142,7 @@ class TrackingEnv(Env):
             "reward/action": -task.action_cost * jnp.sum(action**2),
         }
         done = jnp.maximum((position > task.lost_at).astype(jnp.float32), physics.unstable)
-        finished = (frame >= length - 1).astype(jnp.float32)
+        finished = (frame >= self.reference.length[twin.demonstration] - 1).astype(jnp.float32)
         metrics = {**terms, "error/position": position, "error/rotation": rotation, "unstable": physics.unstable}
         info = {**state.info, "truncation": finished * (1 - done)}
         return state.replace(  # type: ignore[attr-defined]
@@ -156,6 +153,16 @@ class TrackingEnv(Env):
             metrics=metrics,
             info=info,
         )
+
+    def command(
+        self, twin: Twin, action: Float[Array, "26"]
+    ) -> tuple[Int[Array, ""], Float[Array, "26"], Float[Array, "26"]]:
+        """The next frame, the residual there, and what the actuators are told on the way (m, rad)."""
+        task = self.task
+        residual = task.smoothing * twin.residual + (1 - task.smoothing) * residual_scale(task) * action
+        frame = jnp.minimum(twin.frame + 1, self.reference.length[twin.demonstration] - 1)
+        target = self.reference.controls[twin.demonstration, frame] + residual
+        return frame, residual, jnp.clip(target, self._low, self._high)
 
     def _observe(self, twin: Twin) -> Float[Array, "o"]:
         return observe(self.reference, self.task, twin.demonstration, twin.frame, twin.physics, twin.residual)

@@ -2,7 +2,6 @@
 
 import dataclasses
 import difflib
-import math
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -18,74 +17,7 @@ from envs.physics import ENGINES
 from envs.task import Task
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
-
-
-@dataclasses.dataclass(frozen=True)
-class Ppo:
-    """Proximal policy optimisation (Schulman et al. 2017), as `brax.training.agents.ppo` has it.
-
-    Attributes:
-        num_timesteps: control steps of all worlds together.
-        num_envs: worlds in parallel; a multiple of num_minibatches.
-        unroll_length: steps of each world between updates.
-        num_minibatches, num_updates_per_batch: gradient steps an update are their product.
-        learning_rate, entropy_cost, discounting, gae_lambda, clipping_epsilon, max_grad_norm: as usual.
-        policy_layers, value_layers: hidden layer sizes.
-        initial_std: standard deviation of actions at first; a residual of 1 is the task's full range.
-    """
-
-    num_timesteps: int = 1_000_000
-    num_envs: int = 256
-    unroll_length: int = 16
-    num_minibatches: int = 8
-    num_updates_per_batch: int = 4
-    learning_rate: float = 3e-4
-    entropy_cost: float = 3e-4
-    discounting: float = 0.97
-    gae_lambda: float = 0.95
-    clipping_epsilon: float = 0.2
-    max_grad_norm: float = 1.0
-    policy_layers: tuple[int, ...] = (128, 128)
-    value_layers: tuple[int, ...] = (256, 256)
-    initial_std: float = 0.4
-
-    def __post_init__(self):
-        for name in ("policy_layers", "value_layers"):
-            if any(size < 1 for size in getattr(self, name)):
-                raise InputError(f"ppo.{name} is {list(getattr(self, name))}; every layer needs at least 1 unit")
-        whole = ("num_timesteps", "num_envs", "unroll_length", "num_minibatches", "num_updates_per_batch")
-        for name in (*whole, "learning_rate", "clipping_epsilon", "max_grad_norm", "initial_std"):
-            if not 0 < getattr(self, name) < math.inf:
-                raise InputError(f"ppo.{name} is {getattr(self, name)}; it must be a number above 0")
-        if not 0 <= self.entropy_cost < math.inf:
-            raise InputError(f"ppo.entropy_cost is {self.entropy_cost}; it must be a number that is not negative")
-        for name in ("discounting", "gae_lambda"):
-            if not 0 < getattr(self, name) <= 1:
-                raise InputError(f"ppo.{name} is {getattr(self, name)}; it must be above 0 and at most 1")
-        if self.num_envs % self.num_minibatches:
-            raise InputError(
-                f"ppo.num_envs is {self.num_envs}, not a multiple of ppo.num_minibatches ({self.num_minibatches}); "
-                f"give for example {max(self.num_envs // self.num_minibatches, 1) * self.num_minibatches}"
-            )
-
-
-@dataclasses.dataclass(frozen=True)
-class Checks:
-    """Evaluation while training, on the training demonstrations from frame 0, unassisted.
-
-    Attributes:
-        every: control steps between evaluations; the best policy so far is kept.
-        stop_at: stop once this share succeeds (ManipTrans object); above 1, never.
-    """
-
-    every: int = 100_000
-    stop_at: float = 2.0
-
-    def __post_init__(self):
-        if self.every < 1:
-            raise InputError(f"checks.every is {self.every}; it must be at least 1 step")
-        if math.isnan(self.stop_at):
-            raise InputError("checks.stop_at is nan; give a share such as 0.97, or 2 to never stop early")
+from train.options import Checks, Debug, Distributed, Play, Ppo
 
 
 @dataclasses.dataclass(frozen=True)
@@ -103,6 +35,10 @@ class Config:
         task: what an episode is.
         ppo: how to learn.
         checks: evaluation while training.
+        fresh: start anew although `out` holds a training to go on from.
+        distributed: several processes.
+        debug: help with what goes wrong.
+        play: what to show.
     """
 
     name: str = "pinch"
@@ -115,6 +51,10 @@ class Config:
     task: Task = dataclasses.field(default_factory=Task)
     ppo: Ppo = dataclasses.field(default_factory=Ppo)
     checks: Checks = dataclasses.field(default_factory=Checks)
+    fresh: bool = False
+    distributed: Distributed = dataclasses.field(default_factory=Distributed)
+    debug: Debug = dataclasses.field(default_factory=Debug)
+    play: Play = dataclasses.field(default_factory=Play)
 
     def __post_init__(self):
         if self.engine not in ("auto", *ENGINES):

@@ -8,7 +8,7 @@ import jax
 from brax.training.agents.ppo import networks
 from jaxtyping import Array, Float
 
-from train.config import Ppo
+from train.options import Ppo
 
 
 def network_factory(ppo: Ppo) -> Callable[..., networks.PPONetworks]:

@@ -1,35 +1,36 @@
 """Train a residual tracking policy with Brax PPO: `python -m train.ppo config=pinch ppo.num_envs=512 seed=3`.
 
-Writes to the experiment's `out` folder: `best.npz` and `last.npz` (checkpoints), `curve.csv` (evaluations),
-`config.yaml`, and TensorBoard logs.
+Writes to the experiment's `out` folder: `best.npz` and `last.npz` (policies), `state/` (all it takes to go on),
+`curve.csv` (evaluations), `config.yaml`, and TensorBoard logs. A training that was stopped, killed even, goes on from
+its last state when the same command is given again, and ends as it would have ended.
 """
 
-import contextlib
 import dataclasses
-import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import jax
 import numpy as np
-from brax.training.agents.ppo import train as brax_ppo
-from omegaconf import OmegaConf
 from tensorboardX import SummaryWriter
 
 from envs.evaluation import evaluate
 from envs.parallel import ParallelEnv
 from envs.rolling import make_roll_out
-from mjx_hand.errors import InputError
 from mjx_hand.motion.archive import replacing
 from mjx_hand.view.progress import counter
 from train.checkpoint import Checkpoint, save_checkpoint
 from train.config import Config, command
 from train.experiment import World, make_world
-from train.policy import deterministic_policy, network_factory
+from train.interruption import interruptions
+from train.learner import Learner, LearnerState
+from train.policy import deterministic_policy
+from train.processes import agreed, first_alone_speaks, gathered, is_first, join
+from train.run_folder import RunFolder
+from train.unstable import UnstableLog
 
-_LOG_EVERY = 8  # PPO updates between two lines of training metrics
+_LOG_SECONDS = 2.0  # between two lines of training metrics
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,114 +44,128 @@ class Point:
     rotation_error_deg: float
 
 
-class _Solved(Exception):
-    """Raised out of Brax's loop once `checks.stop_at` is reached."""
-
-
 def train(config: Config, world: World | None = None) -> list[Point]:
-    """Train, and return the evaluations, the first before any learning.
+    """Train, or go on, and return the evaluations, the first before any learning.
 
     Args:
         config: the experiment.
         world: its training part, where the caller has made it already.
 
     Raises:
-        InputError: an `out` folder that cannot be written, or whatever is wrong with the configuration.
+        InputError: an `out` folder that cannot be written or holds another training, or whatever is wrong with the
+            configuration.
+        SystemExit: it was interrupted (status 128 and the signal's number); its state is saved.
     """
-    out = Path(config.out)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot write {out}: {error.strerror}; choose another folder with out=FOLDER") from None
+    folder = RunFolder(config)
     world = make_world(config, "train") if world is None else world
-    with replacing(out / "config.yaml") as temporary:
-        temporary.write_text(OmegaConf.to_yaml(OmegaConf.structured(config)))
+    learner = Learner(ParallelEnv(world.env, guard=config.debug.nan_guard), config.ppo)
+    run = _Run(config, world, learner, folder, *_start(config, learner, folder))
+    if run.finished:
+        print(f"{config.name!r} is trained already ({folder.path}); train it anew with fresh=true")
+        return run.points
     print(
         f"training {config.name!r} on {world.env.num_demonstrations} demonstrations, engine {world.env.engine.name}, "
-        f"{config.ppo.num_envs} worlds; results in {out}",
+        f"{config.ppo.num_envs} worlds; results in {folder.path}",
         flush=True,
     )
-    with SummaryWriter(str(out / "tensorboard")) as writer, counter(config.ppo.num_timesteps, "training") as advance:
-        watch = _Watch(config, world, out, writer, advance)
-        with contextlib.suppress(_Solved):
-            learn(config, world, watch)
-    return watch.points
+    if run.points:
+        print(f"going on from {run.steps:,} steps", flush=True)
+    with interruptions() as asked:
+        stopped = run.until_finished(asked)
+    if stopped:
+        print(f"stopped at {run.steps:,} steps and saved; the same command goes on from there", flush=True)
+        raise SystemExit(128 + stopped)
+    if count := int(run.state.unstable):
+        print(f"{count} simulations diverged and were started anew; debug.nan_guard=true keeps their states")
+    return run.points
 
 
-@runtime_checkable
-class Listener(Protocol):
-    """What `learn` tells how it goes."""
-
-    def log(self, steps: int, metrics: Mapping[str, Any]) -> None:
-        """Training metrics, now and then and after each stretch between evaluations."""
-        ...
-
-    def evaluate(self, steps: int, make_policy: Any, parameters: Any) -> None:
-        """Called before the first step and every `checks.every` steps."""
-        ...
+def _start(config: Config, learner: Learner, folder: RunFolder) -> tuple[LearnerState, list[Point], float]:
+    """State, evaluations and seconds so far: of the run that is gone on with, or of a new one."""
+    saved = folder.load(learner.template)
+    if saved is None:
+        return learner.initial(config.seed), [], 0.0
+    state, notes = saved
+    return learner.placed(state), [Point(**point) for point in notes["points"]], notes["seconds"]
 
 
-def learn(config: Config, world: World, watch: Listener) -> None:
-    """Brax PPO on a world, with nothing written but what `watch` writes."""
-    ppo = config.ppo
-    update = ppo.num_envs * ppo.unroll_length
-    evaluations = max(math.ceil(ppo.num_timesteps / max(config.checks.every, update)), 1)
-    brax_ppo.train(
-        environment=ParallelEnv(world.env),
-        wrap_env=False,
-        num_timesteps=ppo.num_timesteps,
-        num_envs=ppo.num_envs,
-        episode_length=int(np.max(world.env.reference.length)),
-        unroll_length=ppo.unroll_length,
-        batch_size=ppo.num_envs // ppo.num_minibatches,
-        num_minibatches=ppo.num_minibatches,
-        num_updates_per_batch=ppo.num_updates_per_batch,
-        learning_rate=ppo.learning_rate,
-        entropy_cost=ppo.entropy_cost,
-        discounting=ppo.discounting,
-        gae_lambda=ppo.gae_lambda,
-        clipping_epsilon=ppo.clipping_epsilon,
-        max_grad_norm=ppo.max_grad_norm,
-        normalize_observations=False,
-        network_factory=network_factory(ppo),
-        seed=config.seed,
-        # Brax's evaluator runs training episodes, some of which start mid-grasp; ours starts all at frame 0.
-        run_evals=False,
-        num_evals=evaluations + 1,
-        policy_params_fn=watch.evaluate,
-        log_training_metrics=True,
-        training_metrics_steps=_LOG_EVERY * update,
-        progress_fn=watch.log,
-    )
+class _Run:
+    """A training on its way: its state, and what it says and writes."""
 
+    def __init__(
+        self,
+        config: Config,
+        world: World,
+        learner: Learner,
+        folder: RunFolder,
+        state: LearnerState,
+        points: list[Point],
+        seconds: float,
+    ):
+        self.config, self.world, self.learner, self.folder = config, world, learner, folder
+        self.state, self.points = state, points
+        self.updates = int(state.updates)
+        each = learner.steps_per_update
+        self.last = -(-config.ppo.num_timesteps // each)
+        self.between = max(config.checks.every // each, 1)
+        self.start = time.monotonic() - seconds
+        policy = deterministic_policy(config.ppo, world.env.observation_size, world.env.action_size)
+        self.unstable = UnstableLog(folder.path / "unstable", world.env) if config.debug.nan_guard else None
+        self.roll_out = make_roll_out(world.env, world.hands, policy)
 
-class _Watch:
-    """Brax's callbacks: logs, evaluations, checkpoints."""
+    @property
+    def steps(self) -> int:
+        return self.updates * self.learner.steps_per_update
 
-    def __init__(self, config: Config, world: World, out: Path, writer: SummaryWriter, advance: Callable[[int], None]):
-        self.config, self.world, self.out = config, world, out
-        self.writer, self.advance = writer, advance
-        self.points: list[Point] = []
-        self.seen = 0
-        self.start = time.monotonic()
-        env = world.env
-        policy = deterministic_policy(config.ppo, env.observation_size, env.action_size)
-        self.roll_out = make_roll_out(env, world.hands, policy)
+    @property
+    def finished(self) -> bool:
+        if not self.points or self.points[-1].steps != self.steps:
+            return False
+        return self.updates >= self.last or self.points[-1].success >= self.config.checks.stop_at
 
-    def log(self, steps: int, metrics: Mapping[str, Any]) -> None:
-        """Training metrics, a few times a second of work."""
-        self.advance(min(int(steps), self.config.ppo.num_timesteps) - self.seen)
-        self.seen = min(int(steps), self.config.ppo.num_timesteps)
-        for name, value in metrics.items():
-            if np.ndim(value) == 0:
-                self.writer.add_scalar(name, float(value), int(steps))
+    def until_finished(self, asked: Callable[[], int]) -> int:
+        """Update, evaluate and save until all is done; the signal's number if one came before."""
+        with (
+            SummaryWriter(str(self.folder.path / "tensorboard"), write_to_disk=is_first()) as writer,
+            counter(self.last * self.learner.steps_per_update, "training (steps)") as advance,
+        ):
+            advance(self.steps)
+            logged = time.monotonic()
+            if not self.points:
+                self._check(writer)
+            while not self.finished:
+                stopped = agreed(asked())
+                if stopped:
+                    self._save()
+                    return stopped
+                self.state, metrics = self.learner.update(self.state)
+                self.updates += 1
+                if time.monotonic() - logged > _LOG_SECONDS:
+                    logged = time.monotonic()
+                    self._log(writer, metrics)
+                self._look_for_unstable()
+                advance(self.learner.steps_per_update)
+                if self.updates % self.between == 0 or self.updates >= self.last:
+                    self._check(writer)
+        return 0
 
-    def evaluate(self, steps: int, make_policy: Any, parameters: Any) -> None:
+    def _log(self, writer: SummaryWriter, metrics: Any) -> None:
+        for name, value in jax.device_get(metrics).items():
+            if np.isfinite(value):  # no episode may have ended in this update
+                writer.add_scalar(name, float(value), self.steps)
+
+    def _look_for_unstable(self) -> None:
+        if self.unstable is not None:
+            caught = gathered(self.state.worlds.info["caught"])
+            for path in self.unstable.write(self.steps, caught) if is_first() else ():
+                print(f"  a simulation diverged: {path}", flush=True)
+
+    def _check(self, writer: SummaryWriter) -> None:
         """All training demonstrations from frame 0; keeps the best policy, because curves are not monotone."""
-        policy, value = parameters[1], parameters[2]
-        scores = evaluate(self.roll_out(policy), [d.object for d in self.world.demonstrations]).rows()
+        params = gathered(self.state.params)
+        scores = evaluate(self.roll_out(params.policy), [d.object for d in self.world.demonstrations]).rows()
         point = Point(
-            steps=int(steps),
+            steps=self.steps,
             seconds=time.monotonic() - self.start,
             success=scores["manip_trans_object"],
             tracking_error_cm=scores["tracking_error_cm"],
@@ -159,26 +174,32 @@ class _Watch:
         best = min((_rank(p) for p in self.points), default=None)
         self.points.append(point)
         for name, score in scores.items():
-            self.writer.add_scalar(f"evaluation/{name}", score, int(steps))
+            writer.add_scalar(f"evaluation/{name}", score, self.steps)
         checkpoint = Checkpoint(
-            policy=jax.tree.map(np.asarray, policy),
-            value=jax.tree.map(np.asarray, value),
-            steps=int(steps),
+            policy=params.policy,
+            value=params.value,
+            steps=self.steps,
             success=point.success,
             experiment=self.config.name,
             observation_size=self.world.env.observation_size,
         )
-        save_checkpoint(checkpoint, self.out / "last.npz")
-        if best is None or _rank(point) < best:
-            save_checkpoint(checkpoint, self.out / "best.npz")
-        _write_curve(self.points, self.out / "curve.csv")
+        if is_first():
+            save_checkpoint(checkpoint, self.folder.path / "last.npz")
+            if best is None or _rank(point) < best:
+                save_checkpoint(checkpoint, self.folder.path / "best.npz")
+            _write_curve(self.points, self.folder.path / "curve.csv")
+        self._save()
         print(
             f"  {point.steps:>9,} steps, {point.seconds:4.0f} s: success {100 * point.success:5.1f} %, "
             f"tracking error {point.tracking_error_cm:.2f} cm",
             flush=True,
         )
-        if point.success >= self.config.checks.stop_at:
-            raise _Solved
+
+    def _save(self) -> None:
+        state = gathered(self.state)
+        if is_first():
+            points = [dataclasses.asdict(point) for point in self.points]
+            self.folder.save(self.steps, state, {"points": points, "seconds": time.monotonic() - self.start})
 
 
 def _rank(point: Point) -> tuple[float, float]:
@@ -192,5 +213,12 @@ def _write_curve(points: list[Point], path: Path) -> None:
         temporary.write_text("\n".join(lines) + "\n")
 
 
+def main(config: Config) -> None:
+    """Join the other processes, if there are any, and train."""
+    join(config.distributed)
+    with first_alone_speaks():
+        train(config)
+
+
 if __name__ == "__main__":
-    command(train)
+    command(main)

@@ -6,8 +6,9 @@ import pytest
 from filelock import FileLock
 
 from envs.demonstrations.dataset import SetSettings, make_set
-from train.config import Checks, Config, Ppo
+from train.config import Config
 from train.experiment import World, make_world
+from train.options import Checks, Ppo
 from train.ppo import Point, train
 
 TINY = Ppo(

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from brax.training.agents.ppo import networks
 
-from train.config import Ppo
+from train.options import Ppo
 from train.policy import deterministic_policy, network_factory
 
 PPO = Ppo(policy_layers=(12, 8), value_layers=(6,), initial_std=0.3)

@@ -12,9 +12,10 @@ from omegaconf import OmegaConf
 from envs.failure import FAILURES
 from mjx_hand.errors import InputError
 from train.checkpoint import load_checkpoint, save_checkpoint
-from train.config import Checks, Config, compose
+from train.config import Config, compose
 from train.evaluate import POLICY, REPLAY, ZERO, Results, evaluate_checkpoint, tables, write_results
 from train.experiment import World, chosen_checkpoint
+from train.options import Checks
 from train.ppo import Point, train
 
 Trained = tuple[Path, list[Point]]
@@ -52,7 +53,14 @@ def test_the_curve_is_what_was_returned(trained: Trained):
 
 def test_the_folder_holds_what_it_takes_to_go_on(trained: Trained, tiny: Config):
     out, _ = trained
-    assert {path.name for path in out.iterdir()} >= {"best.npz", "config.yaml", "curve.csv", "last.npz", "tensorboard"}
+    assert {path.name for path in out.iterdir()} >= {
+        "best.npz",
+        "config.yaml",
+        "curve.csv",
+        "last.npz",
+        "state",
+        "tensorboard",
+    }
     assert not list(out.rglob(".*")), "a temporary file was left behind"
     (events,) = (out / "tensorboard").iterdir()
     assert b"evaluation/tracking_error_cm" in events.read_bytes()

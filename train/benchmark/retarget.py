@@ -1,12 +1,15 @@
 """`python -m train.benchmark retarget`: accuracy and speed of the projection onto hinges, as Markdown tables.
 
-Errors are geodesic angles between each joint's rotation and what its hinges make of it. Times are medians of several
-runs, compilation apart. SciPy solves joint by joint from the naive angles, as one would without this library.
+Errors of rotations are geodesic angles between each joint's rotation and what its hinges make of it: their mean, their
+maximum, and the root of their mean square (RMSE). Errors of finger tips are distances with the wrist held. Times are
+medians of several runs, compilation apart. SciPy solves joint by joint from the naive angles, as one would without this
+library.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import jax
@@ -20,8 +23,12 @@ from mjx_hand.capture.load import load_motion
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import HINGE_LINKS, ONE_DOF, TWO_DOF
 from mjx_hand.hand.load import load_hand
+from mjx_hand.motion import Motion
 from mjx_hand.projection import METHODS, project
-from mjx_hand.retarget.sequence import rigid_hand_of
+from mjx_hand.retarget.frames import HANDS, angles_of, hand_table
+from mjx_hand.retarget.hands import KinematicHands
+from mjx_hand.retarget.options import RetargetOptions
+from mjx_hand.retarget.sequence import retarget_errors, retarget_many
 from mjx_hand.rigid.build import build_rigid_hand
 from mjx_hand.rigid.rigid_hand import RigidHand, joint_rotations
 from mjx_hand.rotations import geodesic_angle
@@ -46,8 +53,8 @@ class Options:
         recording: a MANO-layout recording to measure the accuracy on as well.
     """
 
-    poses: int = 100_000
-    runs: int = 7
+    poses: int = 1_000_000
+    runs: int = 5
     scipy_poses: int = 20
     recording: Path | None = None
 
@@ -76,7 +83,9 @@ def report(options: Options) -> list[str]:
         motion = load_motion(options.recording)
         recorded = jnp.asarray(motion.rotations[motion.valid], jnp.float32)
         lines += ["", f"## {options.recording.parent.name}/{options.recording.name}, {len(recorded)} frames", ""]
-        lines += accuracy_table(recorded, rigid_hand_of(motion, load_hand(side=motion.side)), options.runs)
+        lines += accuracy_table(recorded, KinematicHands().of(motion), options.runs)
+        lines += ["", f"### {options.recording.parent.name}/{options.recording.name}: what can be chosen", ""]
+        lines += option_table(motion)
     return [*lines, "", f"## One call over {options.poses:,} poses", "", *speed_table(rigid, options)]
 
 
@@ -147,17 +156,56 @@ def speed_table(rigid: RigidHand, options: Options) -> list[str]:
     block = random_poses(rigid, min(options.poses, 10_000), seed=2)
     rotations = jnp.tile(block, (-(-options.poses // len(block)), 1, 1, 1))[: options.poses]
     lines = ["| method | compile, s | run, ms | poses/s | times SciPy |", "|---|---|---|---|---|"]
-    for method in METHODS:
-        solve = jax.jit(lambda poses, method=method: project(poses, rigid, method))
+    for name, call in contestants(rigid, options.poses).items():
+        solve = jax.jit(call)
         started = time.perf_counter()
         compiled = solve.lower(rotations).compile()
         compilation = time.perf_counter() - started
         seconds = median_seconds(lambda compiled=compiled: compiled(rotations), options.runs)
         rate = options.poses / seconds
         lines.append(
-            f"| {method} | {compilation:.2f} | {1e3 * seconds:.1f} | {rate:,.0f} | {rate * scipy_seconds:,.0f} |"
+            f"| {name} | {compilation:.2f} | {1e3 * seconds:.1f} | {rate:,.0f} | {rate * scipy_seconds:,.0f} |"
         )
     return [*lines, f"| {SCIPY} ({options.scipy_poses} poses) | | | {1 / scipy_seconds:,.0f} | 1 |"]
+
+
+def contestants(rigid: RigidHand, poses: int) -> Mapping[str, Callable[[jax.Array], jax.Array]]:
+    """What is timed on many poses: every method, and the exact one with all that a data set may ask for."""
+    calls = {method: partial(project, rigid=rigid, method=method) for method in METHODS}
+    calls["exact, carried"] = partial(project, rigid=rigid, carry=True)
+    calls["exact, within limits"] = partial(project, rigid=rigid, limits=True)
+    # Frames of many people, each with its own axes and bones, as data sets are retargeted.
+    people, hands = jnp.arange(poses, dtype=jnp.int32) % HANDS, hand_table([rigid])
+    for name, refine in ((f"exact, {HANDS} people", "none"), (f"tips refined, {HANDS} people", "tips")):
+        calls[name] = partial(
+            angles_of, hand=people, hands=hands, method="exact", carry=False, limits=False, refine=refine
+        )
+    return calls
+
+
+def option_table(motion: Motion) -> list[str]:
+    """Errors of a recording with each of the options, with axes from its joint centres and from its own motion."""
+    lines = [
+        "| axes | options | rotation, degrees: mean / max | finger tip, mm: mean / 95 % / max |",
+        "|---|---|---|---|",
+    ]
+    chosen = {
+        "projection alone": RetargetOptions(),
+        "carry": RetargetOptions(carry=True),
+        "limits": RetargetOptions(limits=True),
+        "refine tips": RetargetOptions(refine="tips"),
+    }
+    for axes in ("anatomical", "functional"):
+        rigid = KinematicHands(axes=axes).of(motion)
+        for name, options in chosen.items():
+            (joints,) = retarget_many([motion], [rigid], options)
+            errors = retarget_errors(motion, joints, rigid)
+            rotation, tip = np.degrees(errors.rotation[errors.valid]), 1e3 * errors.tip_position[errors.valid]
+            lines.append(
+                f"| {axes} | {name} | {rotation.mean():.2f} / {rotation.max():.2f} "
+                f"| {tip.mean():.2f} / {np.percentile(tip, 95):.2f} / {tip.max():.2f} |"
+            )
+    return lines
 
 
 def median_seconds(call: Callable[[], jax.Array], runs: int) -> float:

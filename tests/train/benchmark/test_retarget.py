@@ -7,6 +7,10 @@ from train.benchmark.retarget import SCIPY
 SMALL = ["retarget", "--poses", "60", "--runs", "1", "--scipy-poses", "1"]
 
 
+def lines_of(text):
+    return [line for line in text.splitlines() if line.startswith("|")][2:]
+
+
 def rows(text, heading):
     """The table under a heading: first cell to the others."""
     lines = text.split(heading, 1)[1].split("\n## ", 1)[0].splitlines()
@@ -23,7 +27,12 @@ def test_report_has_the_exact_projection_equal_to_scipy_and_below_the_others(cap
         np.testing.assert_allclose(errors["exact"], errors[SCIPY], atol=2e-3)
         assert errors["exact"][0] < min(errors[m][0] for m in ("paper", "naive", "bch2"))
         np.testing.assert_allclose(errors["paper"], errors["naive"], atol=2e-3)
+    chosen = text.split("what can be chosen", 1)[1].split("\n## ", 1)[0]
+    tips = {tuple(row.strip("| ").split(" | ")[:2]): float(row.split("|")[4].split("/")[0]) for row in lines_of(chosen)}
+    assert tips["anatomical", "refine tips"] < 1 < tips["anatomical", "projection alone"]
+    assert tips["functional", "projection alone"] < 0.5 * tips["anatomical", "projection alone"]
     speed = rows(text, "One call over 60 poses")
+    assert {"exact, carried", "exact, within limits", "exact, 64 people", "tips refined, 64 people"} < set(speed)
     assert all(float(speed[m][3].replace(",", "")) > 1 for m in ("exact", "paper", "naive", "bch2"))
 
 

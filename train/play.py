@@ -1,0 +1,51 @@
+"""Play a policy in the browser, in real time: `python -m train.play config=pinch`.
+
+Shows a held-out demonstration, its twin under the policy, the object, and the error. `play.demonstration=3` chooses
+one; without it, the one of median tracking error.
+"""
+
+import numpy as np
+
+from envs.evaluation import evaluate
+from envs.rolling import make_roll_out
+from mjx_hand.errors import InputError
+from mjx_hand.view.viewer import Viewer
+from train.config import Config, command
+from train.experiment import chosen_checkpoint, make_world
+from train.play_scene import rollout_scene
+from train.policy import deterministic_policy
+
+
+def viewer(config: Config) -> Viewer:
+    """The rollout in a viewer, paused at its first frame.
+
+    Raises:
+        InputError: no such demonstration, or what `chosen_checkpoint` and `Viewer` refuse.
+    """
+    world = make_world(config, "heldout")
+    checkpoint = chosen_checkpoint(config, world.env.observation_size)
+    policy = deterministic_policy(config.ppo, world.env.observation_size, world.env.action_size)
+    rollouts = make_roll_out(world.env, world.hands, policy)(checkpoint.policy)
+    scores = evaluate(rollouts, [demonstration.object for demonstration in world.demonstrations])
+    errors = scores.scores["tracking_error_cm"]
+    index = config.play.demonstration
+    if index is None:
+        index = int(np.argsort(errors)[len(errors) // 2])
+    if index >= len(errors):
+        raise InputError(f"play.demonstration is {index}; there are {len(errors)}, numbered from 0")
+    outcome = scores.failure[index] or "followed to the end"
+    title = f"{config.name} {index}: {outcome}, {errors[index]:.2f} cm"
+    scene = rollout_scene(world.demonstrations[index], rollouts, index, world.hands[index], title)
+    return Viewer(scene, config.play.port)
+
+
+def main(config: Config) -> None:
+    """Serve until Ctrl-C."""
+    shown = viewer(config)
+    shown.play()
+    print(f"{shown.scene.title}: open {shown.url} in a browser; Ctrl-C here ends it", flush=True)
+    shown.wait()
+
+
+if __name__ == "__main__":
+    command(main)

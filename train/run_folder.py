@@ -1,0 +1,87 @@
+"""The folder of one training: its settings, and the states it can go on from."""
+
+import dataclasses
+import json
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from omegaconf import OmegaConf
+
+from mjx_hand.errors import InputError
+from mjx_hand.motion.archive import replacing
+from train.config import Config
+from train.processes import is_first, wait_for_all
+from train.saved_run import load_run, save_run
+
+# What may differ between a training and its continuation: places, and how long and how often.
+_FREE = ("out", "demonstrations", "checkpoint", "fresh", "distributed", "debug", "play", "checks", "ppo.num_timesteps")
+
+
+class RunFolder:
+    """`config.out`, made if absent; with `config.fresh` whatever an earlier training left to go on from is deleted.
+
+    Raises:
+        InputError: it cannot be written, or holds a training of other settings.
+    """
+
+    def __init__(self, config: Config):
+        self.path = Path(config.out)
+        self._states = self.path / "state"
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            if config.fresh and is_first():
+                for old in (self._states, self.path / "tensorboard"):
+                    shutil.rmtree(old, ignore_errors=True)
+        except OSError as error:
+            raise InputError(
+                f"cannot write {self.path}: {error.strerror}; choose another folder with out=FOLDER"
+            ) from None
+        wait_for_all("run folder")
+        written = self.path / "config.yaml"
+        if self._states.is_dir() and written.is_file():
+            self._check_same(config, written)
+        if is_first():
+            with replacing(written) as temporary:
+                temporary.write_text(OmegaConf.to_yaml(OmegaConf.structured(config)))
+
+    def load(self, template: Any) -> tuple[Any, dict[str, Any]] | None:
+        """The newest sound state and its notes, as `load_run`."""
+        return load_run(self._states, template)
+
+    def save(self, steps: int, state: Any, notes: Mapping[str, Any]) -> None:
+        """Keep a state, as `save_run`."""
+        save_run(self._states, steps, state, notes)
+
+    def _check_same(self, config: Config, written: Path) -> None:
+        before, now = (_settings(values) for values in (_read(written), json.loads(json.dumps(_as_dict(config)))))
+        differing = [name for name in sorted(before.keys() | now.keys()) if before.get(name) != now.get(name)]
+        if differing:
+            name = differing[0]
+            others = f" and {len(differing) - 1} more" if len(differing) > 1 else ""
+            raise InputError(
+                f"{self.path} holds a training with {name}={before.get(name)}, now {now.get(name)}{others}; "
+                "choose another folder with out=FOLDER, or train anew in this one with fresh=true"
+            )
+
+
+def _as_dict(config: Config) -> dict[str, Any]:
+    return dataclasses.asdict(config)
+
+
+def _read(path: Path) -> dict[str, Any]:
+    values = OmegaConf.to_container(OmegaConf.load(path))
+    if not isinstance(values, dict):
+        raise InputError(f"{path}: not a configuration; train anew with fresh=true")
+    return {str(name): value for name, value in values.items()}
+
+
+def _settings(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Dotted option to value, without those that may differ."""
+    flat: dict[str, Any] = {}
+    for name, value in values.items():
+        option = prefix + name
+        if option not in _FREE:
+            flat |= _settings(value, f"{option}.") if isinstance(value, Mapping) else {option: value}
+    return flat
