@@ -98,7 +98,7 @@ class Base:
     origin: Triple
 
 
-@dataclass(frozen=True)
+@pytree
 class Placed:
     """A tree at some values: every joint's axis and origin, and the points, in one frame."""
 
@@ -135,4 +135,6 @@ def forward(values: Scalars, tree: KinematicTree, base: Base | None = None) -> P
     positions = jnp.asarray(tree.point_position)
     points = [carried(joint, [positions[p, k] for k in range(3)]) for p, joint in enumerate(tree.point_joints)]
     joints = range(len(tree.parents))
-    return Placed([frames[joint][2] for joint in joints], [origins[joint] for joint in joints], points)
+    return Placed(
+        axes=[frames[joint][2] for joint in joints], origins=[origins[joint] for joint in joints], points=points
+    )

@@ -76,21 +76,22 @@ def improve(
         tried = _moved(search.best, search.step, tree, objective)
         equations = linearise(tried, targets, tree, objective)
         anchor, strength = _held(search.best, holds, objective)
-        better = equations.value + _pull(tried, anchor, strength) <= search.value + _pull(search.best, anchor, strength)
+        value = jnp.asarray(equations.value)
+        better = value + _pull(tried, anchor, strength) <= search.value + _pull(search.best, anchor, strength)
         damping = jnp.clip(search.damping * jnp.where(better, ACCEPTED, REJECTED), LEAST_DAMPING, MOST_DAMPING)
         step = _step(tried, equations, anchor, strength, damping, tree, objective)
         return _Search(
             best=jax.tree.map(lambda new, old: jnp.where(better, new, old), tried, search.best),
             step=jnp.where(better, step, SHORTER * search.step),
-            value=jnp.where(better, equations.value, search.value),
+            value=jnp.where(better, value, search.value),
             damping=damping,
         )
 
     begin = _Search(
         best=start,
         step=jnp.zeros((count, batch)),
-        value=jnp.full(batch, jnp.inf),
-        damping=jnp.full(batch, INITIAL_DAMPING / ACCEPTED),
+        value=jnp.full((batch,), jnp.inf),
+        damping=jnp.full((batch,), INITIAL_DAMPING / ACCEPTED),
     )
     search = jax.lax.fori_loop(0, iterations, iterate, begin)
     return search.best, search.value

@@ -17,6 +17,8 @@ from jaxtyping import Array, Float
 from mjx_hand.pytree import pytree
 from mjx_hand.retarget.kinematic_tree import Base, KinematicTree, Placed, ancestors, forward
 from mjx_hand.retarget.objectives import Objective, Targets
+from mjx_hand.retarget.sparse_solve import Entries
+from mjx_hand.retarget.stages import stage
 from mjx_hand.retarget.triples import Scalar, Scalars, Triple, add, cross, dot, plus, product, subtract, times
 
 FREE = 6  # unknowns of a base that moves: turns about the frame's axes, then shifts along them
@@ -38,7 +40,7 @@ class Posture:
     position: Float[Array, "3 b"]
 
 
-@dataclass
+@pytree
 class Equations:
     """One linearisation.
 
@@ -51,7 +53,7 @@ class Equations:
 
     value: Scalar
     gradient: Scalars
-    hessian: dict[tuple[int, int], Scalar]
+    hessian: Entries
     stiffness: Scalars
 
 
@@ -80,18 +82,28 @@ def place(posture: Posture, tree: KinematicTree, objective: Objective) -> Placed
 
 def linearise(posture: Posture, targets: Targets, tree: KinematicTree, objective: Objective) -> Equations:
     """Value, gradient and Hessian at a posture."""
-    placed = place(posture, tree, objective)
+    like = posture.values[0]
+    placed = stage(lambda: place(posture, tree, objective), like)
+    return stage(lambda: _equations(placed, posture, targets, tree, objective), like)
+
+
+def _equations(
+    placed: Placed, posture: Posture, targets: Targets, tree: KinematicTree, objective: Objective
+) -> Equations:
     movers = {p: _movers(p, placed, tree, base_of(posture, objective)) for p in {*objective.tasks, *objective.origins}}
     columns = {p: _columns(moving) for p, moving in movers.items()}
     count = tree.num_dofs + FREE * objective.free_base
-    out = Equations(0.0, [0.0] * count, {}, [0.0] * count)
+    value: Scalar = 0.0
+    gradient: Scalars = [0.0] * count
+    stiffness: Scalars = [0.0] * count
+    hessian: Entries = {}
     pulls: dict[int, Triple] = {p: [0.0, 0.0, 0.0] for p in movers}
     for k, (origin, task) in enumerate(zip(objective.origins, objective.tasks, strict=True)):
         target = [targets.vectors[k, axis] for axis in range(3)]
         residual = subtract(_vector(placed, origin, task), target)
         loss = _component_loss if objective.kind == "position" else _vector_loss
-        value, pull, stiff, curve = loss(residual, targets.weights[k], jnp.asarray(objective.huber))
-        out.value = out.value + value
+        part, pull, stiff, curve = loss(residual, targets.weights[k], jnp.asarray(objective.huber))
+        value = plus(value, part)
         ends = [(task, 1.0)] + ([(origin, -1.0)] if origin >= 0 else [])
         total: dict[int, Triple] = {}
         for point, sign in ends:
@@ -100,15 +112,15 @@ def linearise(posture: Posture, targets: Targets, tree: KinematicTree, objective
                 signed = column if sign > 0 else times(-1.0, column)
                 total[unknown] = add(total[unknown], signed) if unknown in total else signed
         for row in sorted(total):
-            out.gradient[row] = plus(out.gradient[row], dot(pull, total[row]))
+            gradient[row] = plus(gradient[row], dot(pull, total[row]))
             stiffened = [product(s, x) for s, x in zip(stiff, total[row], strict=True)]
-            out.stiffness[row] = plus(out.stiffness[row], dot(stiffened, total[row]))
+            stiffness[row] = plus(stiffness[row], dot(stiffened, total[row]))
             bent = curve(total[row])
             for column in (c for c in total if c <= row):
-                _add(out, row, column, dot(bent, total[column]))
+                _add(hessian, row, column, dot(bent, total[column]))
     for point, moving in movers.items():
-        _add_turning(out, pulls[point], moving)
-    return out
+        _add_turning(hessian, pulls[point], moving)
+    return Equations(value=value, gradient=gradient, hessian=hessian, stiffness=stiffness)
 
 
 def _vector(placed: Placed, origin: int, task: int) -> Triple:
@@ -144,7 +156,7 @@ def _columns(movers: list[_Mover]) -> dict[int, Triple]:
     return columns
 
 
-def _add_turning(out: Equations, pull: Triple, movers: list[_Mover]) -> None:
+def _add_turning(hessian: Entries, pull: Triple, movers: list[_Mover]) -> None:
     """Second derivatives of a point, weighed by the pull on it: each mover turns the columns of those further out."""
     for k, inner in enumerate(movers):
         if inner.axis is None:
@@ -154,11 +166,11 @@ def _add_turning(out: Equations, pull: Triple, movers: list[_Mover]) -> None:
             value = dot(swept, outer.column)
             twice = inner is not outer and inner.unknown == outer.unknown
             row, column = max(inner.unknown, outer.unknown), min(inner.unknown, outer.unknown)
-            _add(out, row, column, product(2.0, value) if twice else value)
+            _add(hessian, row, column, product(2.0, value) if twice else value)
 
 
-def _add(out: Equations, row: int, column: int, value: Scalar) -> None:
-    out.hessian[row, column] = plus(out.hessian.get((row, column), 0.0), value)
+def _add(hessian: Entries, row: int, column: int, value: Scalar) -> None:
+    hessian[row, column] = plus(hessian.get((row, column), 0.0), value)
 
 
 def _vector_loss(residual: Triple, weight: Scalar, huber: Scalar):

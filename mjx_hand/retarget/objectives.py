@@ -97,7 +97,7 @@ def brought_together(
         linked: whether a frame follows the one before it in the batch.
         before: what held before the first frame, where that is linked.
     """
-    distance = jnp.linalg.norm(vectors[: len(before)], axis=1)
+    distance = _length(vectors[: len(before)])
     begins, ends = distance < objective.pinch, distance > objective.release
     # What the last frame said that said anything: the running composition of "set", "clear" and "keep".
     says = begins | ends | ~linked
@@ -105,7 +105,7 @@ def brought_together(
         lambda a, b: (a[0] | b[0], jnp.where(b[0], b[1], a[1])), (says, begins), axis=-1
     )
     said = jax.lax.associative_scan(jnp.logical_or, says, axis=-1)
-    return jnp.where(said, state, before[:, None])
+    return jnp.where(jnp.asarray(said), jnp.asarray(state), before[:, None])
 
 
 def num_thumb_pairs(objective: Objective) -> int:
@@ -124,19 +124,23 @@ def targets_of(vectors: Float[Array, "k 3 b"], objective: Objective, together: B
     count = len(objective.tasks)
     seen = jnp.isfinite(vectors).all(axis=1)
     vectors = jnp.where(seen[:, None], vectors, 0.0)
-    wanted = objective.scaling * vectors
+    wanted = jnp.asarray(objective.scaling) * vectors
     weights = jnp.full(seen.shape, 1.0 / (3 * count if objective.kind == "position" else count), vectors.dtype)
     if objective.kind == "dexpilot":
         tips = _num_tips(objective)
         pairs = list(combinations(range(tips - 1), 2))
         between = count - tips
-        length = jnp.linalg.norm(vectors[:between], axis=1)
+        length = _length(vectors[:between])
         both = [together[i] & together[j] & (length[tips - 1 + k] <= _FINGERS_NEAR) for k, (i, j) in enumerate(pairs)]
         near = jnp.concatenate([together, jnp.stack(both)])
-        numbers = [np.repeat(values, (tips - 1, len(pairs)))[:, None] for values in (_TOGETHER, _WEIGHTS)]
-        short = vectors[:between] * (numbers[0] / (length + 1e-6))[:, None]
+        gaps, importance = (np.repeat(values, (tips - 1, len(pairs)))[:, None] for values in (_TOGETHER, _WEIGHTS))
+        short = vectors[:between] * (gaps / (length + 1e-6))[:, None]
         wanted = jnp.concatenate([jnp.where(near[:, None], short, wanted[:between]), wanted[between:]])
-        important = jnp.where(near, numbers[1], 1.0)
+        important = jnp.where(near, importance, 1.0)
         to_wrist = jnp.full((tips, seen.shape[1]), float(between + tips))
         weights = weights * jnp.concatenate([important, to_wrist])
     return Targets(vectors=wanted, weights=jnp.where(seen, weights, 0.0))
+
+
+def _length(vectors: Float[Array, "k 3 b"]) -> Float[Array, "k b"]:
+    return jnp.sqrt(jnp.sum(vectors**2, axis=1))

@@ -109,7 +109,8 @@ def _drive(path: Path, joint: Joint, joints: Mapping[str, Joint]) -> _Drive:
     """The joint that leads `joint` in the end, itself where it mimics none."""
     slope, shift, followed = 1.0, 0.0, [joint.name]
     while joint.mimic is not None:
-        slope, shift = slope * joint.mimic.multiplier, shift + slope * joint.mimic.offset
+        factor, offset = joint.mimic.multiplier, joint.mimic.offset  # the standard's defaults are 1 and 0
+        slope, shift = slope * (1.0 if factor is None else factor), shift + slope * (offset or 0.0)
         leader = joint.mimic.joint
         if leader not in joints or joints[leader].type == "fixed":
             raise InputError(f"{path}: joint {joint.name!r} mimics {leader!r}, which is no movable joint of it")
