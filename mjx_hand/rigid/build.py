@@ -12,7 +12,7 @@ from mjx_hand.hand.skinning import joint_centres, shaped_template
 from mjx_hand.rigid.axes import AXES
 from mjx_hand.rigid.collision import palm_capsules, phalanx_capsules, skin_samples
 from mjx_hand.rigid.face_links import face_links
-from mjx_hand.rigid.limits import anatomical_limits
+from mjx_hand.rigid.limits import active_limits, anatomical_limits
 from mjx_hand.rigid.pieces import close
 from mjx_hand.rigid.rigid_hand import RigidHand
 from mjx_hand.rigid.segments import cut, mass_properties
@@ -56,12 +56,15 @@ def build_rigid_hand(hand: HandModel, shape: ArrayLike | None = None, axes: str 
     finger_ends, finger_radii = phalanx_capsules(points, areas, centres, tips)
     capsule_links = (0,) * len(palm_radii) + tuple(range(1, 16))
     lower, upper = anatomical_limits()
+    soft_lower, soft_upper = active_limits()
     return RigidHand(
         wrist_position=centres[0],
         link_offset=np.concatenate([np.zeros((1, 3)), centres[1:] - centres[list(PARENTS[1:])]]),
         hinge_axis=AXES[axes](centres, hand.side),
         hinge_lower=lower,
         hinge_upper=upper,
+        soft_lower=soft_lower,
+        soft_upper=soft_upper,
         tip_offset=tips - centres[list(TIP_LINKS)],
         link_mass=mass * scale,
         link_com=np.stack([p[1] for p in properties]) - centres,

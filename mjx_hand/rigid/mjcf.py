@@ -98,6 +98,9 @@ def write_mjcf(
 ) -> Path:
     """Write `<side>_hand.xml` and `meshes/*.obj`, with paths relative to the folder; returns the XML's path.
 
+    A joint's `range` is its hard limits. MuJoCo has no soft limits of its own, so they stand in the joint's `user`
+    data, which no engine acts on: `model.joint(name).user`, lower and upper.
+
     Args as of `hand_spec`. The folder appears whole or not at all.
 
     Raises:
@@ -112,6 +115,9 @@ def write_mjcf(
         for mesh in spec.meshes:
             mesh.file = f"{mesh.name.removeprefix(prefix)}.obj"
             mesh.uservert, mesh.userface = [], []
+        if rigid.soft_lower is not None and rigid.soft_upper is not None:
+            for joint, *limits in zip(HINGES, rigid.soft_lower, rigid.soft_upper, strict=True):
+                spec.joint(prefix + joint).userdata = limits
         spec.compile()
         (temporary / name).write_text(spec.to_xml())
     return Path(folder) / name

@@ -25,7 +25,8 @@ class RigidHand:
         wrist_position: the wrist joint in the hand frame; the first link's frame origin.
         link_offset: each link's joint centre relative to its parent's (row 0 is zero).
         hinge_axis: unit axes. A base joint turns as R = R(abduction) R(flexion); positive is flexion.
-        hinge_lower, hinge_upper: limits.
+        hinge_lower, hinge_upper: hard limits.
+        soft_lower, soft_upper: soft limits within them, where a controller should begin to give way, or None.
         rest_rotation: each joint's rotation while its hinges are at zero, R = R(hinges) rest_rotation, for a person
             whose hinges do not pass through the flat hand; None is the identity. It is free of turns about the
             joint's own axes, so that angles and limits are counted from the flat hand all the same.
@@ -55,6 +56,8 @@ class RigidHand:
     mesh_faces: tuple[np.ndarray, ...]
     capsule_links: tuple[int, ...] = static()
     rest_rotation: Float[np.ndarray | Array, "15 3 3"] | None = None
+    soft_lower: Float[np.ndarray | Array, "20"] | None = None
+    soft_upper: Float[np.ndarray | Array, "20"] | None = None
     side: str = static()
     name: str = static()
 

@@ -23,6 +23,9 @@ from mjx_hand.rigid.rigid_hand import RigidHand, axes_in_links
 _SMALL_MASS = 1e-5  # kg
 _SMALL_INERTIA = 1e-9 * np.eye(3)  # kg m^2
 _WRIST_FORCE, _WRIST_TORQUE, _WRIST_SPEED = 200.0, 20.0, 2.0  # N, N m, m/s: what the limits of the wrist's joints state
+# At soft limits (https://wiki.ros.org/pr2_controller_manager/safety_limits): the speed allowed per radian from the
+# limit (1/s), and how far below the allowed speed (rad/s) the full force may act.
+_SOFT_SLOPE, _SOFT_SPEED = 100.0, 1.0
 
 
 def write_urdf(
@@ -36,7 +39,7 @@ def write_urdf(
     """Write `<side>_hand.urdf` and `meshes/*.obj`, with paths relative to the folder; returns the URDF's path.
 
     Links are named as `hand.joints.LINKS`, joints as `HINGES`; finger tips are links `<finger>_tip` on fixed joints.
-    The folder appears whole or not at all.
+    `<limit>` has the hard limits, `<safety_controller>` the soft ones. The folder appears whole or not at all.
 
     Args:
         rigid: the hand.
@@ -138,8 +141,17 @@ def _add_small_link(robot: ET.Element, name: str) -> None:
 
 
 def _limit_hinge(joint: ET.Element, rigid: RigidHand, hinge: int, gains: Gains) -> None:
-    limits = [rigid.hinge_lower[hinge], rigid.hinge_upper[hinge], gains.force_limit[hinge], gains.max_velocity]
-    _add_limit(joint, limits)
+    force = float(gains.force_limit[hinge])
+    _add_limit(joint, [float(rigid.hinge_lower[hinge]), float(rigid.hinge_upper[hinge]), force, gains.max_velocity])
+    if rigid.soft_lower is None or rigid.soft_upper is None:
+        return
+    values = {
+        "soft_lower_limit": float(rigid.soft_lower[hinge]),
+        "soft_upper_limit": float(rigid.soft_upper[hinge]),
+        "k_position": _SOFT_SLOPE,
+        "k_velocity": force / _SOFT_SPEED,
+    }
+    ET.SubElement(joint, "safety_controller", {name: _text([value]) for name, value in values.items()})
 
 
 def _add_wrist_joints(robot: ET.Element) -> None:
