@@ -10,11 +10,22 @@ from mjx_hand.cli.fit import fit
 from mjx_hand.cli.info import info
 from mjx_hand.cli.keypoints import keypoints
 from mjx_hand.cli.retarget import retarget
+from mjx_hand.cli.robot import robot
+from mjx_hand.cli.track import track
 from mjx_hand.cli.view import view
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 
-COMMANDS = {"build": build, "fit": fit, "info": info, "keypoints": keypoints, "retarget": retarget, "view": view}
+COMMANDS = {
+    "build": build,
+    "fit": fit,
+    "info": info,
+    "keypoints": keypoints,
+    "retarget": retarget,
+    "robot": robot,
+    "track": track,
+    "view": view,
+}
 
 
 def main(argv: Sequence[str] | None = None) -> int:

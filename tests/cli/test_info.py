@@ -114,7 +114,7 @@ def test_real_recordings(recordings, capsys):
         assert "6000 at 100/s (60.0 s)" in text
         assert "thumb_tip 8.2 %" in text
         assert "--markers glove13 --out recording.motion.npz" in text
-    assert "world landmarks" in info(capsys, recordings / "mediapipe_video" / "human_hand_video.mp4")
+    assert "next: mjx-hand track" in info(capsys, recordings / "mediapipe_video" / "human_hand_video.mp4")
     assert "nothing that is known here; known are" in refused(
         capsys, recordings / "dexmv_mustard" / "mustard_bottle.stl"
     )
