@@ -7,12 +7,16 @@ the joint turns there as a knuckle does.
 import dataclasses
 
 import numpy as np
+import trimesh
 from jaxtyping import Float, Int
 
 RINGS = 6  # between the border and the pole
-# A dome stays below the neighbour's skin: deeper away from its border, by this share of the way to the joint.
+# How far below the neighbour's skin a dome stays, once it is away from its border, as a share of the way to the joint.
 DEPTH = 0.06
-WIDEST = 1.1  # of the ball's radius: how wide the dome may stay behind its border
+WIDEST = 1.05  # of the ball's radius: how wide the dome may stay behind its border
+# Up to the first angle from its border the dome keeps the border's own distance, from the second on it is the ball: a
+# web that is pulled away from the palm then shows this tongue, not a gap.
+TONGUE = np.deg2rad([10, 35])
 _FOLDED = np.deg2rad(170)  # an arc of 180 degrees has no direction
 
 
@@ -62,17 +66,19 @@ def dome(
     corners, shares, distance = exits(centre, ways, skin, skin_faces)
 
     # The ball itself: it touches the nearest skin, so that it stays inside however the joint turns.
-    ball = (1 - DEPTH) * np.linalg.norm(skin - centre, axis=1).min()
+    nearest = trimesh.triangles.closest_point(skin[skin_faces], np.broadcast_to(centre, (len(skin_faces), 3)))
+    ball = (1 - DEPTH) * np.linalg.norm(nearest - centre, axis=1).min()
+    sunk = 1 - DEPTH * np.minimum(1, 3 * along)[:, None]
     held = np.clip(reach * (1 - DEPTH), ball, WIDEST * ball)
-    neck, crown = _ease(along / 0.4)[:, None], _ease((along - 0.6) / 0.4)[:, None]
-    radius = (1 - neck) * reach + neck * held
+    neck = _ease((angle * along[:, None] - TONGUE[0]) / (TONGUE[1] - TONGUE[0]))
+    crown = _ease((along - 0.6) / 0.4)[:, None]
+    radius = (1 - neck) * reach * sunk + neck * held
     radius = np.append(((1 - crown) * radius + crown * ball).ravel(), ball)
-    depth = DEPTH * np.append(np.repeat(np.minimum(1, 3 * along), count), 1.0)
-    radius = np.minimum(radius, (1 - depth) * distance)
+    radius = np.minimum(radius, np.append(np.repeat(sunk, count), 1 - DEPTH) * distance)
     return Dome(corners, shares, 1 - radius / distance, _rings(count))
 
 
-def _ease(x: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+def _ease(x: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
     """From 0 to 1 without a kink."""
     x = np.clip(x, 0, 1)
     return x * x * (3 - 2 * x)

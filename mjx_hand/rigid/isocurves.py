@@ -16,7 +16,9 @@ from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import LINKS, NUM_LINKS, PARENTS, TIP_LINKS
 from mjx_hand.hand.model import HandModel
 
-SMOOTHING = 3  # rounds of averaging over neighbours: painted weights are rougher than their borders should be
+# Painted weights are rougher than borders should be: rounds of averaging over neighbours, and the average's share.
+# More of either moves borders away from where rigid links follow the skin best.
+SMOOTHING, SMOOTHED = 8, 0.6
 # How far skin may reach behind a phalanx's own joint, in bone lengths: none beyond the second figure. When the finger
 # flexes such skin (the thumb's web) would swing out at the back of the hand.
 BEHIND = (0.0, 0.2)
@@ -59,9 +61,11 @@ def patches(hand: HandModel) -> Patches:
 def link_pull(hand: HandModel) -> Float[np.ndarray, "v 16"]:
     """How strongly each link holds each vertex: its skinning weight, smoothed, and faded out behind its joint."""
     average = _averaging(hand)
-    pull = np.asarray(hand.weights, dtype=float)
+    weights = np.asarray(hand.weights, dtype=float)
+    smooth = weights
     for _ in range(SMOOTHING):
-        pull = average @ pull
+        smooth = average @ smooth
+    pull = SMOOTHED * smooth + (1 - SMOOTHED) * weights
     template = np.asarray(hand.template, dtype=float)
     centres = np.asarray(hand.joint_regressor, dtype=float) @ template
     for link, bone in enumerate(bones(template, centres, np.asarray(hand.tip_vertices))[1:], start=1):
