@@ -135,9 +135,8 @@ def _marker_facts(path: Path, kind: str, out: Path) -> FileFacts:
 def _video(path: Path) -> FileFacts | None:
     if path.suffix.lower() not in VIDEOS:
         return None
-    return FileFacts(
-        "video", (("to read it", "a tracker's keypoints are needed, such as MediaPipe's world landmarks"),)
-    )
+    fact = ("to read it", "MediaPipe, the extra 'video', finds the hand's keypoints")
+    return FileFacts("video", (fact,), (f"mjx-hand track {path} --out {path.stem}.keypoints.npz",))
 
 
 def _unknown(path: Path) -> FileFacts:
