@@ -24,6 +24,8 @@ def build(
     collision: Literal["capsules", "hulls"] = "capsules",
     report: bool = False,
     motion: Path | None = None,
+    axes_from: Path | None = None,
+    limits_from: Path | None = None,
 ) -> None:
     """Write a hand of a given shape as URDF and MJCF, with meshes, masses, limits and collision shapes.
 
@@ -37,11 +39,21 @@ def build(
         report: measure how far the rigid links' skin lies from the blended skin, in postures from fist to spread
             fingers: a table here, skin_error.csv and skin_error.png in the folder.
         motion: a recording whose postures the report measures too.
+        axes_from: a recording of the person whose motion the hinge axes are fitted to (docs/axes.md).
+        limits_from: a recording of the person whose range becomes the soft limits.
     """
     if motion is not None and not report:
         raise InputError(f"--motion {motion} is measured by the report alone; give --report too")
     hand = load_hand(mano, side)
     rigid = build_rigid_hand(hand, np.array(shape))
+    taken = []
+    if axes_from is not None or limits_from is not None:
+        from mjx_hand.cli.from_recording import with_recorded_axes, with_recorded_limits
+
+        for take, recording in ((with_recorded_axes, axes_from), (with_recorded_limits, limits_from)):
+            if recording is not None:
+                rigid, said = take(rigid, recording)
+                taken.append(said)
     measured = None
     with filling(out) as folder:  # all files or none
         names = [
@@ -58,6 +70,8 @@ def build(
     ]
     title = f"{rigid.name}, {rigid.side}: {len(LINKS)} links, {len(HINGES)} hinges, {rigid.link_mass.sum() * 1e3:.0f} g"
     print_table(title, ("link", "mass (g)", "triangles", "capsules"), rows)
+    for said in taken:
+        print(said)
     if measured is not None:
         from mjx_hand.cli.skin_report import PICTURE, TABLE, print_skin_report
 
