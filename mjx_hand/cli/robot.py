@@ -1,0 +1,90 @@
+"""`mjx-hand robot`: a recording of a person's hand onto a robot hand."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+import tyro
+
+from mjx_hand.capture.keypoints.load import is_keypoint_file, load_keypoints
+from mjx_hand.capture.keypoints.recording import KeypointRecording
+from mjx_hand.capture.keypoints.side import known_side
+from mjx_hand.capture.load import load_motion
+from mjx_hand.cli.output import print_table, spread
+from mjx_hand.errors import InputError
+from mjx_hand.hand.load import load_hand
+from mjx_hand.retarget.keypoints import retarget_keypoints
+from mjx_hand.retarget.kinematic_tree import KinematicTree, joint_values
+from mjx_hand.retarget.motion_keypoints import motion_keypoints
+from mjx_hand.retarget.objectives import Objective
+from mjx_hand.retarget.palm_frame import in_palm
+from mjx_hand.retarget.robot_hand import load_robot, robot_objective
+from mjx_hand.retarget.robot_motion import RobotMotion, save_robot_motion, vector_errors
+from mjx_hand.retarget.sequence import rigid_hand_of
+
+
+def robot(
+    recording: Annotated[Path, tyro.conf.Positional],
+    urdf: Path,
+    robot: str,
+    out: Path,
+    objective: Literal["vector", "dexpilot", "position"] = "vector",
+    side: Literal["right", "left"] | None = None,
+    sequence: str | None = None,
+    fps: float | None = None,
+) -> None:
+    """Move a robot hand as a person's hand moved.
+
+    Args:
+        recording: keypoints (.json, .npz or .csv) or a motion of any format that mjx-hand retarget reads.
+        urdf: the robot hand's URDF; its meshes are not needed.
+        robot: its description: a name in mjx_hand/retarget/robots, or the path of a file like those.
+        out: the .npz to write: the values of all joints.
+        objective: what follows what: vector (wrist to finger tips), dexpilot (those, and tips brought together), or
+            position (links where the keypoints are, with a base that moves).
+        side: which hand, where the recording holds both or does not say.
+        sequence: the name of one hand or recording in the file, where there are several.
+        fps: frames a second, where the recording does not say.
+    """
+    description = load_robot(robot)
+    tree, wanted = robot_objective(description, urdf, objective)
+    found, which = _recorded(recording, side, sequence, fps)
+    if found.fps is None:
+        raise InputError(f"{recording}: does not say its frame rate; give --fps")
+    keypoints = found.positions
+    if not wanted.free_base:
+        keypoints = in_palm(keypoints, which, description.fingers, description.palmar)
+    followed = retarget_keypoints(keypoints, tree, wanted)
+    motion = RobotMotion(
+        fps=float(found.fps),
+        values=joint_values(followed.dofs, tree),
+        base_position=followed.base_position,
+        base_quaternion=followed.base_quaternion,
+        valid=followed.valid,
+        joint_names=tree.joint_names,
+        robot=description.name,
+        source=found.source,
+    )
+    save_robot_motion(motion, out)
+    gaps = len(motion.valid) - int(motion.valid.sum())
+    print(
+        f"{found.source or recording}: a {which} hand, {len(motion.valid)} frames at {motion.fps:g}/s, {gaps} in gaps"
+    )
+    _report(tree, wanted, vector_errors(keypoints, followed, tree, wanted)[followed.valid])
+    print(f"{out}  load it with mjx_hand.retarget.robot_motion.load_robot_motion({str(out)!r})")
+
+
+def _recorded(path: Path, side: str | None, sequence: str | None, fps: float | None) -> tuple[KeypointRecording, str]:
+    """The keypoints of a recording of any kind, and which hand it is."""
+    if path.is_file() and is_keypoint_file(path):
+        found = load_keypoints(path, side=side, sequence=sequence, fps=fps)
+        return found, known_side(found, side)[0]
+    motion = load_motion(path, side=side, sequence=sequence, fps=fps)
+    return motion_keypoints(motion, rigid_hand_of(motion, load_hand(side=motion.side))), motion.side
+
+
+def _report(tree: KinematicTree, objective: Objective, errors: np.ndarray) -> None:
+    names = [tree.point_names[k] for k in objective.tasks]
+    ends = [f"{tree.point_names[k]} to " if k >= 0 else "" for k in objective.origins]
+    rows = [(f"{a}{b}", *spread(errors[:, k], 1e3)) for k, (a, b) in enumerate(zip(ends, names, strict=True))]
+    print_table("how far the robot's links stay from what they follow", ("mm", "mean", "95 %", "max"), rows)
