@@ -7,12 +7,15 @@ import pytest
 import yourdfpy
 from scipy.spatial.transform import Rotation
 
+from mjx_hand.capture.keypoints.layouts import hand_keypoints
 from mjx_hand.hand.joints import HINGE_LINKS, HINGES, LINKS
 from mjx_hand.projection import project
 from mjx_hand.pytree import replace
+from mjx_hand.retarget.human_tree import human_tree
+from mjx_hand.retarget.kinematic_tree import tree_points
 from mjx_hand.rigid.bone_lengths import with_link_offsets
 from mjx_hand.rigid.mjcf import write_mjcf
-from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics, joint_rotations
+from mjx_hand.rigid.rigid_hand import RigidHand, finger_tips, forward_kinematics, joint_rotations
 from mjx_hand.rigid.urdf import write_urdf
 
 
@@ -67,6 +70,11 @@ def test_descriptions_agree(bent, angles, tmp_path):
         np.testing.assert_allclose(found, rotation, atol=1e-5)
         places = np.stack([data.body(name).xpos - data.body("wrist").xpos for name in LINKS])
         np.testing.assert_allclose(places, position, atol=1e-5)
+
+
+def test_the_tree_for_keypoints_agrees(bent, angles):
+    expected = hand_keypoints(forward_kinematics(angles, bent)[1], finger_tips(angles, bent))
+    np.testing.assert_allclose(tree_points(angles, human_tree(bent)), expected, atol=1e-6)
 
 
 def test_new_bones_bring_axes_and_the_flat_rest(bent, rigid):
