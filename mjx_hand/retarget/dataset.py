@@ -82,6 +82,8 @@ def retarget_dataset(
     Raises:
         InputError: nothing matches, the settings are not valid, or the output cannot be written.
     """
+    if mano is not None and not mano.is_file():
+        raise InputError(f"{mano}: no such file; give the path of a MANO file, or none for the open hand")
     hands = KinematicHands(mano, axes)
     given = {"axes": axes, "mano": None if mano is None else key_of(mano, {}), "side": side, "fps": fps}
     items = _items(folder, out, pattern, dataclasses.asdict(options) | given)

@@ -67,7 +67,7 @@ def hand_table(hands: Sequence[RigidHand]) -> RigidHand:
         flat = np.tile(np.eye(3), (15, 1, 1))
         hands = [hand if hand.rest_rotation is not None else replace(hand, rest_rotation=flat) for hand in hands]
     plain = {"name": "", "side": "right", "capsule_links": (0,)}  # what kinematics does not need, alike for all
-    plain |= {"capsule_ends": np.zeros((1, 2, 3)), "capsule_radius": np.ones(1)}
+    plain |= {"soft_lower": None, "soft_upper": None, "capsule_ends": np.zeros((1, 2, 3)), "capsule_radius": np.ones(1)}
     bare = [replace(hand, **plain) for hand in hands]
     return stack_hands([*bare, *[bare[0]] * (HANDS - len(bare))])
 

@@ -139,6 +139,8 @@ def test_names_that_would_meet_and_folders_that_cannot_be_used_are_refused(folde
         retarget_dataset(folder, tmp_path / "out", PLAIN, pattern="*.c3d")
     with pytest.raises(InputError, match="axes is 'best'"):
         retarget_dataset(folder, tmp_path / "out", PLAIN, axes="best")
+    with pytest.raises(InputError, match=r"gone\.pkl: no such file"):
+        retarget_dataset(folder, tmp_path / "out", PLAIN, mano=tmp_path / "gone.pkl")
     (folder / "a").write_bytes((folder / "a.npz").read_bytes())
     with pytest.raises(InputError, match="would have one output"):
         retarget_dataset(folder, tmp_path / "out", PLAIN, pattern="a*")
