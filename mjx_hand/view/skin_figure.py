@@ -44,14 +44,14 @@ def skin_error_figure(
     figure = Figure(figsize=(2.3 * columns, 2.1 * len(names) + 0.5), layout="constrained")
     grid = np.atleast_2d(figure.subplots(len(names), columns, squeeze=False))
     scale = cm.ScalarMappable(colors.Normalize(0, _LARGEST), "turbo")
+    for axes, title in zip(grid[0], [f"{view}: {kind}" for view in _VIEWS for kind in ("rigid", "error")], strict=True):
+        axes.set_title(title)
     for row, name, segments, mesh, error in zip(grid, names, rigid, soft, errors, strict=True):
         shades = scale.to_rgba(1e3 * error[mesh[1]].mean(axis=1))[:, :3]
         pair = [(segments, [_SKIN] * len(segments)), ([mesh], [shades])]
-        for k, (view, (way, up)) in enumerate(_VIEWS.items()):
-            for axes, (meshes, paints), kind in zip(row[2 * k : 2 * k + 2], pair, ("rigid", "error"), strict=True):
+        for k, (way, up) in enumerate(_VIEWS.values()):
+            for axes, (meshes, paints) in zip(row[2 * k : 2 * k + 2], pair, strict=True):
                 _draw(axes, meshes, paints, np.array(way), np.array(up))
-                if row is grid[0]:
-                    axes.set_title(f"{view}: {kind}")
         row[0].text(-0.02, 0.5, name, rotation=90, transform=row[0].transAxes, ha="right", va="center")
     bar = figure.colorbar(scale, ax=grid, shrink=0.6, extend="max", pad=0.01)
     bar.set_label("distance from the blended skin (mm)")
@@ -73,6 +73,6 @@ def _draw(axes: Axes, meshes: Sequence[Mesh], paints: Sequence[np.ndarray], way:
     order = order[normal[order, 2] > 0]
     seen = np.clip(paint * shade[:, None], 0, 1)[order]
     axes.add_collection(PolyCollection(list(corners[order, :, :2]), facecolors=seen, edgecolors=seen, linewidths=0.3))
-    axes.set_aspect("equal")
+    axes.set_aspect("equal", adjustable="datalim")
     axes.autoscale_view()
     axes.set_axis_off()
