@@ -48,7 +48,9 @@ def hull_planes(hulls: Float[np.ndarray, "h v 3"]) -> Float[np.ndarray, "h f 4"]
     """
     faces = [np.unique(np.round(ConvexHull(np.unique(hull, axis=0)).equations, 9), axis=0) for hull in hulls]
     most = max(map(len, faces), default=0)
-    return np.array([np.pad(rows, ((0, most - len(rows)), (0, 0)), mode="edge") for rows in faces]).reshape(len(faces), most, 4)
+    return np.array([np.pad(rows, ((0, most - len(rows)), (0, 0)), mode="edge") for rows in faces]).reshape(
+        len(faces), most, 4
+    )
 
 
 def half_extents(kind: str, size: Float[Array | np.ndarray, "*b 3"]) -> Float[Array, "*b 3"]:
