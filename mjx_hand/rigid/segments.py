@@ -75,7 +75,8 @@ def cut(hand: HandModel) -> Cut:
     """Cut the skin of a hand into 16 segments.
 
     Raises:
-        InputError: a link gets no skin, or the mesh is in several parts, or a joint lies outside the skin.
+        InputError: a link gets no skin, the mesh is in several parts or not consistently turned, or a joint lies
+            outside the skin.
     """
     skin = patches(hand)
     template = np.asarray(hand.template, dtype=float)
@@ -84,6 +85,8 @@ def cut(hand: HandModel) -> Cut:
     closed = _closed(np.asarray(hand.faces))
     outward = bones(template, centres, np.asarray(hand.tip_vertices))
     links = face_left_of(skin.faces, skin.face_links)
+    if len(links) != skin.faces.size:  # an edge that two faces run along the same way
+        raise InputError(f"{hand.name}: its faces do not all look outward; give one surface, turned one way")
     segments = []
     for link in range(NUM_LINKS):
         faces = skin.faces[skin.face_links == link]

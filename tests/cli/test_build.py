@@ -1,6 +1,7 @@
 """`mjx-hand build`, called as a shell would, its files loaded by programs of others."""
 
 import csv
+import pickle
 
 import matplotlib.image as mpimg
 import mujoco
@@ -10,6 +11,9 @@ import yourdfpy
 
 from mjx_hand.cli.main import main
 from mjx_hand.hand.joints import HINGES, LINKS
+from mjx_hand.hand.load import load_hand
+from mjx_hand.rigid.build import build_rigid_hand
+from tests.hand.mano_layout import layout, official
 
 
 @pytest.fixture(scope="module")
@@ -86,6 +90,41 @@ def test_input_at_fault_is_one_line_status_2_and_no_output(tmp_path, capsys, arg
     assert message in printed.err
     assert printed.err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "arguments", "message"),
+    [
+        ({}, ["--side", "left"], "holds a right hand, but side is 'left'"),
+        ({"shapedirs": None}, [], "has no 'shapedirs'"),
+        ({"weights": np.zeros((3, 16))}, [], "'weights' has shape (3, 16)"),
+        ({"v_template": np.full((1649, 3), np.inf)}, [], "'v_template' has NaN, infinity"),
+        ({}, ["--shape", *["0.1"] * 11], "up to 10"),
+        ({"f": np.roll(load_hand().faces, 1, axis=0)[:, [0, 1, 1]]}, [], "surface"),
+    ],
+    ids=["side", "key", "shape", "infinity", "coefficients", "faces"],
+)
+def test_mano_files_at_fault_are_one_line_and_no_output(tmp_path, capsys, changes, arguments, message):
+    values = {key: value for key, value in (layout(load_hand()) | changes).items() if value is not None}
+    path = tmp_path / "MANO_RIGHT.pkl"
+    path.write_bytes(pickle.dumps(values))
+    assert main(["build", "--out", str(tmp_path / "hand"), "--mano", str(path), *arguments]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.startswith("mjx-hand: ")
+    assert message in printed.err
+    assert printed.err.count("\n") == 1
+    assert [entry.name for entry in tmp_path.iterdir()] == ["MANO_RIGHT.pkl"]
+
+
+def test_a_mano_file_becomes_a_hand(tmp_path, capsys):
+    path = tmp_path / "MANO_LEFT.pkl"
+    path.write_bytes(official(load_hand(side="left")))
+    assert main(["build", "--out", str(tmp_path / "hand"), "--mano", str(path), "--side", "left", "--shape", "1"]) == 0
+    assert "MANO_LEFT.pkl, left: 16 links" in capsys.readouterr().out
+    found = mujoco.MjModel.from_xml_path(str(tmp_path / "hand" / "left_hand.xml"))
+    own = build_rigid_hand(load_hand(side="left"), [1.0])
+    np.testing.assert_allclose(found.body("wrist").mass[0], own.link_mass[0], rtol=1e-4)
 
 
 def test_folder_that_cannot_be_written(tmp_path, capsys):

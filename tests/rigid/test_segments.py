@@ -194,6 +194,13 @@ def test_a_mesh_in_two_parts_is_refused() -> None:
         cut(replace(hand, faces=faces, joint_regressor=regressor, **more))
 
 
+def test_a_face_turned_over_is_refused() -> None:
+    faces = np.array(HANDS["right"].faces)
+    faces[1000] = faces[1000][::-1]
+    with pytest.raises(InputError, match="do not all look outward"):
+        cut(replace(HANDS["right"], faces=faces))
+
+
 def test_a_hole_at_the_wrist_is_closed() -> None:
     """MANO's own mesh ends in an open wrist."""
     hand = HANDS["right"]
