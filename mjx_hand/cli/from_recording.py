@@ -24,10 +24,8 @@ def with_recorded_axes(rigid: RigidHand, recording: Path) -> tuple[RigidHand, st
     fitted = fit_functional_axes(rigid, motion.rotations, motion.valid)
     frames = motion.rotations[motion.valid].astype(np.float32)
     before, after = (np.degrees(_errors(frames, hand)).mean() for hand in (rigid, fitted))
-    return (
-        fitted,
-        f"axes fitted to {recording}: {after:.2f} degrees mean error on it, {before:.2f} with anatomical ones",
-    )
+    gain = f"mean error on it {after:.2f} degrees, {before:.2f} with anatomical axes"
+    return fitted, f"axes fitted to {recording}: {gain}"
 
 
 def with_recorded_limits(rigid: RigidHand, recording: Path) -> tuple[RigidHand, str]:

@@ -1,7 +1,18 @@
 """Hinge axes from the joint centres of the rest pose (arXiv 2512.07359, section III-B).
 
-The rules hold in MANO's right-hand frame only (fingers -x, back of the hand +y, thumb side +z): "up" in the paper's
-index rule is the thumb's side there. A left hand is mirrored in x first, and its axes are mirrored back.
+The rules hold in MANO's right-hand frame only (fingers -x, back of the hand +y, thumb side +z). The paper's text can
+be read in more ways than one; read as here, every axis bends its finger the way that fingers bend:
+
+- The index finger's reference is the world's vertical, [0, 0, 1]. It must point to the thumb's side, as +z of MANO's
+  frame does; in a z-up world with the hand flat on a table, flexion and abduction would change places.
+- The references of middle, ring and little finger are differences of MCP joints, here all from the little finger's
+  side to the thumb's; the other order turns the signs round.
+- The thumb's MCP and IP axes are turned by 55 degrees about the bone, here from flexion towards abduction;
+  with the other sign the thumb would bend away from the fingers.
+- The thumb's CMC frame has its y for flexion (opposition) and its z for abduction, which comes first as at the fingers.
+- Of the left hand nothing is said: it is mirrored in x, and its axes are mirrored back.
+
+`projection.fit_functional_axes` fits them to a person's motion; docs/axes.md compares the two.
 """
 
 from collections.abc import Callable

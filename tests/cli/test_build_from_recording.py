@@ -34,7 +34,7 @@ def test_axes_and_range_are_the_persons(recording, tmp_path, capsys):
     arguments = ["build", "--out", str(tmp_path / "hand"), "--axes-from", str(path), "--limits-from", str(path)]
     assert main(arguments) == 0
     printed = " ".join(capsys.readouterr().out.split())
-    assert f"axes fitted to {path}: 0." in printed
+    assert f"axes fitted to {path}: mean error on it 0." in printed
     assert "soft limits: the range of" in printed
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "hand" / "right_hand.xml"))
     for name in ("index_pip_flexion", "ring_dip_flexion"):
