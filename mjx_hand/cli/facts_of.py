@@ -48,9 +48,10 @@ def demonstration(found: Demonstration) -> Facts:
     """Of a demonstration."""
     thing = found.object
     size = " x ".join(f"{1e3 * s:.0f}" for s in thing.size if s > 0)
+    kind = f"{thing.kind} of {len(thing.hulls)} convex pieces" if thing.kind == "mesh" else thing.kind
     return (
         ("grasp", found.grasp),
-        ("object", f"{thing.kind}, {size} mm (half extents or radius), {1e3 * thing.mass:.0f} g"),
+        ("object", f"{kind}, {size} mm (half extents or radius), {1e3 * thing.mass:.0f} g"),
         *joint_motion(found.motion),
     )
 

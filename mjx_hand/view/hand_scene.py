@@ -12,7 +12,7 @@ from mjx_hand.motion import Demonstration, JointMotion, Motion
 from mjx_hand.motion.demonstration import ObjectDescription
 from mjx_hand.motion.resample import quaternion_matrices
 from mjx_hand.rigid.rigid_hand import RigidHand, chain, forward_kinematics, joint_rotations
-from mjx_hand.view.scene import Colour, MeshLayer, SkinLayer
+from mjx_hand.view.scene import Colour, Mesh, MeshLayer, SkinLayer
 
 SKIN: Colour = (206, 150, 122)
 TWIN: Colour = (120, 144, 178)
@@ -95,7 +95,7 @@ def object_layers(demonstration: Demonstration) -> tuple[MeshLayer, ...]:
             meshes=(object_mesh(demonstration.object),),
             transforms=transforms(quaternion_matrices(pose[:, 3:]), pose[:, :3])[:, None],
             colour=OBJECT,
-            edges=demonstration.object.kind == "box",
+            edges=demonstration.object.kind in ("box", "mesh"),
         )
     ]
     boxes = [trimesh.creation.box(extents=2 * size) for size in demonstration.support]
@@ -113,18 +113,18 @@ def object_layers(demonstration: Demonstration) -> tuple[MeshLayer, ...]:
     return tuple(layers)
 
 
-def object_mesh(description: ObjectDescription) -> tuple[Array, Array]:
-    """The surface of a simple object, in its own frame."""
+def object_mesh(description: ObjectDescription) -> Mesh:
+    """The surface of an object, in its own frame; of a mesh, its convex pieces."""
     a, b = float(description.size[0]), float(description.size[1])
     mesh = {
         "box": lambda: trimesh.creation.box(extents=2 * description.size),
         "sphere": lambda: trimesh.creation.icosphere(subdivisions=3, radius=a),
         "cylinder": lambda: trimesh.creation.cylinder(radius=a, height=2 * b, sections=48),
         "capsule": lambda: trimesh.creation.capsule(radius=a, height=2 * b, count=[32, 32]),
-        "mesh": lambda: trimesh.util.concatenate([trimesh.convex.convex_hull(hull) for hull in description.hulls]),
+        "mesh": lambda: trimesh.util.concatenate([trimesh.PointCloud(row).convex_hull for row in description.hulls]),
     }[description.kind]()
     if description.kind == "capsule":
-        mesh.apply_translation(-mesh.bounds.mean(axis=0))
+        mesh.apply_translation(-mesh.bounds.mean(axis=0))  # trimesh's begins at its lower ball's centre
     return np.asarray(mesh.vertices), np.asarray(mesh.faces)
 
 

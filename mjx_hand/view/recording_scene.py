@@ -13,10 +13,11 @@ from mjx_hand.pytree import replace
 from mjx_hand.retarget.sequence import retarget_errors, retarget_sequence, rigid_hand_of
 from mjx_hand.rigid.build import build_rigid_hand
 from mjx_hand.view.hand_scene import object_layers, skin_layer, skin_vertices, skinned_motion, twin_layer
-from mjx_hand.view.scene import Colour, Curve, PointLayer, Scene, SkinLayer
+from mjx_hand.view.scene import Colour, Curve, Layer, PointLayer, Scene, SkinLayer
 
 MARKER: Colour = (46, 107, 186)
 KEYPOINT: Colour = (38, 130, 120)
+GLASS = 0.55
 
 
 def motion_scene(motion: Motion, hand: HandModel, up: str = "+z") -> Scene:
@@ -60,7 +61,7 @@ def with_markers(scene: Scene, recording: MarkerRecording) -> Scene:
     points = np.where(recording.visible[..., None], recording.positions, np.nan)
     curve = Curve("markers from the skin", 1e3 * distance_from_skin(_skin(scene), points), "mm")
     layer = PointLayer("markers", points, MARKER, radius=0.0035)
-    return replace(scene, layers=(*scene.layers, layer), curves=(curve, *scene.curves))
+    return replace(scene, layers=(*_see_through(scene), layer), curves=(curve, *scene.curves))
 
 
 def with_keypoints(scene: Scene, seen: Float[np.ndarray, "t 21 3"], fitted: Float[np.ndarray, "t 21 3"]) -> Scene:
@@ -70,7 +71,7 @@ def with_keypoints(scene: Scene, seen: Float[np.ndarray, "t 21 3"], fitted: Floa
     mean = np.where(count > 0, np.nansum(away, axis=1) / np.maximum(count, 1), np.nan)
     layer = PointLayer("keypoints", seen, KEYPOINT, lines=BONES.reshape(-1, 2))
     curve = Curve("keypoints from the hand's", 1e3 * mean, "mm")
-    return replace(scene, layers=(*scene.layers, layer), curves=(curve, *scene.curves))
+    return replace(scene, layers=(*_see_through(scene), layer), curves=(curve, *scene.curves))
 
 
 def distance_from_skin(skin: SkinLayer, points: Float[np.ndarray, "t m 3"]) -> Float[np.ndarray, "t"]:
@@ -81,6 +82,11 @@ def distance_from_skin(skin: SkinLayer, points: Float[np.ndarray, "t m 3"]) -> F
         if len(seen):
             out[frame] = KDTree(skin_vertices(skin, frame)).query(seen)[0].mean()
     return out
+
+
+def _see_through(scene: Scene) -> tuple[Layer, ...]:
+    """The scene's layers, its hands like glass: what was recorded is on them or in them."""
+    return tuple(layer if isinstance(layer, PointLayer) else replace(layer, opacity=GLASS) for layer in scene.layers)
 
 
 def _skin(scene: Scene) -> SkinLayer:

@@ -184,18 +184,22 @@ def test_keypoints_beside_the_hand(motion, motions):
     assert lines.shape == (15, 2)
 
 
-@pytest.mark.parametrize("kind", ["box", "sphere", "cylinder", "capsule"])
-def test_objects_have_their_size(kind):
-    vertices, faces = object_mesh(
-        ObjectDescription(size=np.array([0.02, 0.03, 0.025]), mass=1.0, friction=1.0, kind=kind)
-    )
-    half = {
-        "box": (0.02, 0.03, 0.025),
-        "sphere": (0.02,) * 3,
-        "cylinder": (0.02, 0.02, 0.03),
-        "capsule": (0.02, 0.02, 0.05),
-    }
-    np.testing.assert_allclose(np.ptp(vertices, axis=0) / 2, half[kind], rtol=0.02)
+@pytest.mark.parametrize(
+    ("kind", "half"),
+    [
+        ("box", (0.02, 0.03, 0.025)),
+        ("sphere", (0.02, 0.02, 0.02)),
+        ("cylinder", (0.02, 0.02, 0.03)),
+        ("capsule", (0.02, 0.02, 0.05)),
+        ("mesh", (0.04, 0.01, 0.01)),
+    ],
+)
+def test_objects_have_their_size(kind, half):
+    cube = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * 0.01
+    hulls = cube + np.array([[[-0.03, 0, 0]], [[0.03, 0, 0]]]) if kind == "mesh" else np.zeros((0, 0, 3))
+    thing = ObjectDescription(size=np.array([0.02, 0.03, 0.025]), mass=1.0, friction=1.0, hulls=hulls, kind=kind)
+    vertices, faces = object_mesh(thing)
+    np.testing.assert_allclose(np.ptp(vertices, axis=0) / 2, half, rtol=0.02)
     np.testing.assert_allclose(vertices.max(axis=0), -vertices.min(axis=0), rtol=0.02)
     assert faces.max() < len(vertices)
 
