@@ -13,7 +13,7 @@ from mjx_hand.capture.batches import Meter, padded, part, solve_all
 from mjx_hand.capture.fit_report import FitReport, make_report
 from mjx_hand.capture.linearise import PoseState
 from mjx_hand.capture.marker_set import MarkerSet, rest_offsets
-from mjx_hand.capture.pose_prior import joint_precision, pose_prior
+from mjx_hand.capture.pose_prior import habitual_pose, joint_precision, pose_prior
 from mjx_hand.capture.recording import MarkerRecording
 from mjx_hand.capture.shape_solver import Subject, solve_subject
 from mjx_hand.capture.skinned_points import skinned_points
@@ -38,7 +38,7 @@ MEAN_SHAPE_DEVIATION = 0.005
 # How far (m) from the model a marker counts as wrong: on the mean shape, with the shape, from key frames.
 OUTLIERS = (0.05, 0.01, 0.03)
 KNOWN = 1e-3  # standard deviation of a shape coefficient that is known
-KEYFRAME_STEPS, SUBJECT_STEPS, FRAME_STEPS, SMOOTH_STEPS = 15, 18, 4, 2
+KEYFRAME_STEPS, SUBJECT_STEPS, FRAME_STEPS, SMOOTH_STEPS = 15, 18, 4, 4
 
 
 @dataclass(frozen=True)
@@ -143,9 +143,12 @@ def fit_many(
             points, *some, expected, shape_deviation, place_deviation, jnp.asarray(SUBJECT_STEPS)
         )
         frames, state = begin(track, points, subject, palm, prior, settings.marker_deviation, OUTLIERS[2])
-        vectors = between_keyframes(track.frames, key, np.asarray(pose.vectors)[: len(key)])
+        vectors = np.asarray(pose.vectors)[: len(key)]
+        habit = np.broadcast_to(habitual_pose(prior, vectors), frames.mean.shape)
         subjects.append(subject)
-        starts.append((frames, replace(state, vectors=vectors)))
+        starts.append(
+            (replace(frames, mean=habit), replace(state, vectors=between_keyframes(track.frames, key, vectors)))
+        )
         meter.add(len(key) * SUBJECT_STEPS)
 
     frames, state = joined(starts)

@@ -56,6 +56,17 @@ def pose_prior(hand: HandModel) -> PosePrior:
     )
 
 
+def habitual_pose(prior: PosePrior, vectors: Float[np.ndarray, "k 15 3"]) -> Float[np.ndarray, "15 3"]:
+    """The prior's mean with each joint bent as it is on average in `vectors` (rad).
+
+    A joint that is hidden most likely does what this person's mostly does. Off the flexion axis a few frames say less
+    than the prior does.
+    """
+    mean, flexion = (np.asarray(a, np.float64) for a in (prior.mean, prior.ranges.axes[:, 0]))
+    more = np.einsum("ja,ja->j", flexion, vectors.mean(axis=0) - mean)
+    return (mean + more[:, None] * flexion).astype(np.float32)
+
+
 def joint_precision(precision: Float[np.ndarray, "5 9 9"]) -> Float[np.ndarray, "15 3 3"]:
     """The part of a prior's precision that speaks of each joint alone."""
     blocks = precision.reshape(5, 3, 3, 3, 3)

@@ -10,7 +10,7 @@ import pytest
 from mjx_hand.capture.joint_ranges import beyond, joint_ranges
 from mjx_hand.capture.linearise import PoseState, left_jacobian, pose_jacobian, residuals, step_state
 from mjx_hand.capture.normal_blocks import NormalBlocks, joint_covariance, normal_blocks, solve_blocks
-from mjx_hand.capture.pose_prior import joint_precision, pose_prior
+from mjx_hand.capture.pose_prior import habitual_pose, joint_precision, pose_prior
 from mjx_hand.capture.pose_solver import Frames, energy, normal_equations, trust
 from mjx_hand.capture.skinned_points import shape_points, skinned_points
 from mjx_hand.capture.smoothing import second_difference_bands, smooth_vectors
@@ -202,3 +202,14 @@ def test_smoothing_solves_its_least_squares_problem():
     matrix = 4 * seen.T @ seen + 4 * second.T @ second
     expected = np.linalg.solve(matrix, 4 * seen.T @ values.reshape(7, -1))[frames].reshape(7, 15, 3)
     np.testing.assert_allclose(smooth, expected, atol=1e-10)
+
+
+def test_habitual_pose_takes_flexion_and_nothing_else(hand):
+    prior = pose_prior(hand)
+    frames = np.asarray(prior.ranges.axes, np.float64)
+    mean = np.asarray(prior.mean, np.float64)
+    rng = np.random.default_rng(6)
+    turns = rng.normal(size=(4, 15, 3))  # flexion, sideways, about the bone
+    habit = habitual_pose(prior, (mean + np.einsum("jka,bjk->bja", frames, turns)).astype(np.float32))
+    expected = turns.mean(axis=0) * [1.0, 0.0, 0.0]
+    np.testing.assert_allclose(np.einsum("jka,ja->jk", frames, habit - mean), expected, atol=1e-6)
