@@ -44,7 +44,7 @@ def project_two_dof_within(
     lower, upper = jnp.asarray(lower, rotation.dtype), jnp.asarray(upper, rotation.dtype)
     free = project_two_dof(rotation, first_axis, second_axis)
     first, second = (nearest_within(angle, lower[..., k], upper[..., k]) for k, angle in enumerate(free))
-    pairs = []
+    pairs: list[tuple[Array, Array]] = []
     for limits in (lower, upper):
         at = jnp.broadcast_to(limits[..., 0], first.shape)
         left = compose(axis_angle_matrix(first_axis, -at), rotation)
@@ -52,11 +52,16 @@ def project_two_dof_within(
         at = jnp.broadcast_to(limits[..., 1], first.shape)
         left = compose(rotation, axis_angle_matrix(second_axis, -at))
         pairs.append((nearest_within(project_one_dof(left, first_axis), lower[..., 0], upper[..., 0]), at))
-    matches = jnp.stack([_match(rotation, first_axis, second_axis, *pair) for pair in pairs])
-    chosen = jnp.argmax(matches, axis=0)[None]
-    at_limit = [jnp.take_along_axis(jnp.stack(angles), chosen, axis=0)[0] for angles in zip(*pairs, strict=True)]
+    at_first, at_second = pairs[0]
+    nearest = _match(rotation, first_axis, second_axis, at_first, at_second)
+    for pair in pairs[1:]:  # by selections, which fuse where an indexed choice would not
+        match = _match(rotation, first_axis, second_axis, *pair)
+        better = match > nearest
+        at_first = jnp.where(better, pair[0], at_first)
+        at_second = jnp.where(better, pair[1], at_second)
+        nearest = jnp.where(better, match, nearest)
     inside = _same_angle(free[0], first) & _same_angle(free[1], second)
-    return jnp.where(inside, first, at_limit[0]), jnp.where(inside, second, at_limit[1])
+    return jnp.where(inside, first, at_first), jnp.where(inside, second, at_second)
 
 
 def _match(rotation: Array, first_axis: Array, second_axis: Array, first: Array, second: Array) -> Array:

@@ -25,7 +25,7 @@ from mjx_hand.hand.joints import HINGE_LINKS, ONE_DOF, TWO_DOF
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion import Motion
 from mjx_hand.projection import METHODS, project
-from mjx_hand.retarget.frames import HANDS, angles_of, hand_table
+from mjx_hand.retarget.frames import CHUNK, HANDS, angles_of, hand_table, in_chunks
 from mjx_hand.retarget.hands import KinematicHands
 from mjx_hand.retarget.options import RetargetOptions
 from mjx_hand.retarget.sequence import retarget_errors, retarget_many
@@ -84,7 +84,7 @@ def report(options: Options) -> list[str]:
         recorded = jnp.asarray(motion.rotations[motion.valid], jnp.float32)
         lines += ["", f"## {options.recording.parent.name}/{options.recording.name}, {len(recorded)} frames", ""]
         lines += accuracy_table(recorded, KinematicHands().of(motion), options.runs)
-        lines += ["", f"### {options.recording.parent.name}/{options.recording.name}: what can be chosen", ""]
+        lines += ["", f"## {options.recording.name} of {options.recording.parent.name}: what can be chosen", ""]
         lines += option_table(motion)
     return [*lines, "", f"## One call over {options.poses:,} poses", "", *speed_table(rigid, options)]
 
@@ -156,7 +156,7 @@ def speed_table(rigid: RigidHand, options: Options) -> list[str]:
     block = random_poses(rigid, min(options.poses, 10_000), seed=2)
     rotations = jnp.tile(block, (-(-options.poses // len(block)), 1, 1, 1))[: options.poses]
     lines = ["| method | compile, s | run, ms | poses/s | times SciPy |", "|---|---|---|---|---|"]
-    for name, call in contestants(rigid, options.poses).items():
+    for name, call in contestants(rigid).items():
         solve = jax.jit(call)
         started = time.perf_counter()
         compiled = solve.lower(rotations).compile()
@@ -166,21 +166,28 @@ def speed_table(rigid: RigidHand, options: Options) -> list[str]:
         lines.append(
             f"| {name} | {compilation:.2f} | {1e3 * seconds:.1f} | {rate:,.0f} | {rate * scipy_seconds:,.0f} |"
         )
+    for name, rate in chunk_rates(rigid, np.asarray(rotations[: options.poses // 10 + 1]), options.runs).items():
+        lines.append(f"| {name} | | | {rate:,.0f} | {rate * scipy_seconds:,.0f} |")
     return [*lines, f"| {SCIPY} ({options.scipy_poses} poses) | | | {1 / scipy_seconds:,.0f} | 1 |"]
 
 
-def contestants(rigid: RigidHand, poses: int) -> Mapping[str, Callable[[jax.Array], jax.Array]]:
-    """What is timed on many poses: every method, and the exact one with all that a data set may ask for."""
+def contestants(rigid: RigidHand) -> Mapping[str, Callable[[jax.Array], jax.Array]]:
+    """What is timed on many poses: every method, and the exact one with its options."""
     calls = {method: partial(project, rigid=rigid, method=method) for method in METHODS}
     calls["exact, carried"] = partial(project, rigid=rigid, carry=True)
     calls["exact, within limits"] = partial(project, rigid=rigid, limits=True)
-    # Frames of many people, each with its own axes and bones, as data sets are retargeted.
-    people, hands = jnp.arange(poses, dtype=jnp.int32) % HANDS, hand_table([rigid])
-    for name, refine in ((f"exact, {HANDS} people", "none"), (f"tips refined, {HANDS} people", "tips")):
-        calls[name] = partial(
-            angles_of, hand=people, hands=hands, method="exact", carry=False, limits=False, refine=refine
-        )
     return calls
+
+
+def chunk_rates(rigid: RigidHand, rotations: Float[np.ndarray, "n 15 3 3"], runs: int) -> dict[str, float]:
+    """Frames a second of folders' own way, from host memory and back: chunks, and a hand of its own for each person."""
+    people, hands = np.arange(len(rotations), dtype=np.int32) % HANDS, hand_table([rigid])
+    rates = {}
+    for name, refine in (("exact", "none"), ("tips refined", "tips")):
+        call = partial(angles_of, hands=hands, method="exact", carry=False, limits=False, refine=refine)
+        seconds = median_seconds(lambda call=call: jnp.asarray(in_chunks(call, rotations, people)[0]), runs)
+        rates[f"{name}, {HANDS} people, in chunks of {CHUNK}"] = len(rotations) / seconds
+    return rates
 
 
 def option_table(motion: Motion) -> list[str]:

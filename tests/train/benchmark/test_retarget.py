@@ -32,7 +32,8 @@ def test_report_has_the_exact_projection_equal_to_scipy_and_below_the_others(cap
     assert tips["anatomical", "refine tips"] < 1 < tips["anatomical", "projection alone"]
     assert tips["functional", "projection alone"] < 0.5 * tips["anatomical", "projection alone"]
     speed = rows(text, "One call over 60 poses")
-    assert {"exact, carried", "exact, within limits", "exact, 64 people", "tips refined, 64 people"} < set(speed)
+    assert {"exact, carried", "exact, within limits"} < set(speed)
+    assert any(name.startswith("tips refined, 64 people") for name in speed)
     assert all(float(speed[m][3].replace(",", "")) > 1 for m in ("exact", "paper", "naive", "bch2"))
 
 
