@@ -120,10 +120,12 @@ def test_hulls_are_convex_closed_and_around_their_links(rigid, with_hulls):
     for path, vertices in zip(paths, rigid.mesh_vertices, strict=True):
         hull = trimesh.load_mesh(with_hulls / path, process=False)
         assert hull.is_watertight
-        assert hull.is_convex
         assert hull.volume > 0
-        beyond = np.einsum("fi,fvi->fv", hull.face_normals, vertices[None] - hull.triangles[:, 0][:, None])
-        assert beyond.max() < 1e-6
+        # Convex, and around its link: nothing lies beyond a face (the file has tenths of a micrometre).
+        everything = np.concatenate([vertices, hull.vertices])
+        wide = hull.area_faces > 1e-8  # a sliver's direction is all rounding
+        beyond = np.einsum("fi,fvi->fv", hull.face_normals[wide], everything - hull.triangles[wide, :1])
+        assert beyond.max() < 2e-6
 
 
 def test_hulls_collide_in_engines(rigid, with_hulls):
