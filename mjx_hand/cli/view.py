@@ -22,7 +22,7 @@ from mjx_hand.view.recording_scene import (
     with_markers,
 )
 from mjx_hand.view.scene import Scene
-from mjx_hand.view.viewer import PORT, Viewer
+from mjx_hand.view.viewer import PORT, serving
 
 Up = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 
@@ -54,10 +54,10 @@ def view(
     scene = recording_scene(recording, side, sequence, fps, up, mano)
     if markers is not None:
         scene = with_markers(scene, load_markers(markers))
-    viewer = Viewer(scene, port, host)
-    viewer.play()
-    print(f"{recording}: open {viewer.url} in a browser; Ctrl-C here ends it")
-    viewer.wait()
+    with serving(scene, port, host) as viewer:
+        viewer.play()
+        print(f"{recording}: open {viewer.url} in a browser; Ctrl-C here ends it", flush=True)
+        viewer.wait()
 
 
 def recording_scene(

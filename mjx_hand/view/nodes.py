@@ -108,7 +108,10 @@ def _add_points(server: viser.ViserServer, layer: PointLayer) -> Show:
 
     def show(frame: int) -> None:
         for k, node in enumerate(balls):
-            node.position, node.visible = at[frame, k], bool(seen[frame, k])
+            if seen[frame, k]:
+                node.position = at[frame, k]
+            if node.visible != seen[frame, k]:
+                node.visible = bool(seen[frame, k])
         if lines is not None:
             lines.points = _segments(at[frame], seen[frame], ends)
 

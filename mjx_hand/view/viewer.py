@@ -14,12 +14,12 @@ from viser import uplot
 
 from mjx_hand.errors import InputError
 from mjx_hand.pytree import replace
-from mjx_hand.view.nodes import add_layer
+from mjx_hand.view.nodes import Handle, Show, add_layer
 from mjx_hand.view.playback import SPEEDS, Playback
 from mjx_hand.view.scene import Scene, check_scene, positions
 
 PORT = 8080
-TICK = 1 / 60  # seconds between looks at the clock
+TICK = 1 / 40  # seconds between looks at the clock; more frames than that a browser far away does not get
 _COLOURS = ("#3b6fb6", "#d1603d", "#4c9a6a", "#8a5fb0")
 _AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
 _PLANES = {"x": "yz", "y": "xz", "z": "xy"}
@@ -32,6 +32,7 @@ class Viewer:
         scene: what is shown.
         server: viser's server, for more of one's own.
         frame: the frame shown now.
+        switches: the layers' checkboxes, in the scene's order.
     """
 
     def __init__(self, scene: Scene, port: int = PORT, host: str = "127.0.0.1") -> None:
@@ -55,11 +56,10 @@ class Viewer:
         self._closed = threading.Event()
         self._set_stage()
         layers = [(layer, *add_layer(self.server, layer)) for layer in scene.layers]
-        self._movers = [show for _, _, show in layers]
+        self._layers = [(root, move) for _, root, move in layers]
         self._add_time_line()
         with self.server.gui.add_folder("Layers"):
-            for layer, root, _ in layers:
-                self._add_switch(layer.name, root)
+            self.switches = [self._add_switch(layer.name, root, move) for layer, root, move in layers]
         self._add_curves()
         self._clock = threading.Thread(target=self._run, daemon=True, name="mjx-hand viewer")
         self._clock.start()
@@ -110,13 +110,13 @@ class Viewer:
         with contextlib.suppress(KeyboardInterrupt):
             while not self._closed.wait(3600):
                 pass
-        self.close()
 
     def _draw(self, frame: int) -> None:
         self.frame = frame
         with self.server.atomic():
-            for move in self._movers:
-                move(frame)
+            for root, move in self._layers:
+                if root.visible:  # hidden layers follow when they are shown again
+                    move(frame)
             self._slider.value = frame
             self._time.value = f"{frame / self.scene.fps:.2f} s of {(self.scene.num_frames - 1) / self.scene.fps:.2f} s"
             for curve, text in zip(self.scene.curves, self._figures, strict=True):
@@ -190,12 +190,16 @@ class Viewer:
         self._speed.on_update(begin_again)
         self._loop.on_update(begin_again)
 
-    def _add_switch(self, name: str, root: viser.SceneNodeHandle) -> None:
+    def _add_switch(self, name: str, root: Handle, move: Show) -> viser.GuiCheckboxHandle:
         box = self.server.gui.add_checkbox(name, initial_value=root.visible)
 
         @box.on_update
         def _(event: viser.GuiEvent) -> None:
-            root.visible = box.value
+            with self._lock:
+                move(self.frame)
+                root.visible = box.value
+
+        return box
 
     def _add_curves(self) -> None:
         self._figures: list[viser.GuiInputHandle[str]] = []

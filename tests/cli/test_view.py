@@ -11,6 +11,7 @@ from mjx_hand.cli.main import main
 from mjx_hand.errors import InputError
 from mjx_hand.motion import save_joint_motion, save_motion
 from mjx_hand.view.scene import Scene
+from mjx_hand.view.viewer import Viewer
 from tests.capture.keypoints.grips import FPS, FRAMES, grip, keypoints_of
 from tests.cli.test_info import joint_motion
 
@@ -41,12 +42,7 @@ def test_keypoints_lie_over_the_hand_that_was_fitted_to_them(tmp_path):
 
 def test_the_command_serves_what_was_asked_for(tmp_path, capsys, monkeypatch):
     shown = []
-
-    def wait(viewer: command.Viewer) -> None:
-        shown.append(viewer.scene)
-        viewer.close()
-
-    monkeypatch.setattr(command.Viewer, "wait", wait)
+    monkeypatch.setattr(Viewer, "wait", lambda viewer: shown.append(viewer.scene))
     motion = grip()
     save_motion(motion, tmp_path / "motion.npz")
     markers = MarkerRecording(

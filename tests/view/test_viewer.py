@@ -122,6 +122,25 @@ def test_missing_points_are_hidden():
         assert not node.visible
 
 
+def test_a_hidden_layer_is_where_it_belongs_when_it_is_shown(motions):
+    with serving(motions, port=0) as viewer:
+        link = viewer.server.scene.get_handle_by_name("/rigid twin/3")
+        assert link is not None
+        before = np.array(link.position)
+        viewer.show(30)
+        np.testing.assert_array_equal(link.position, before)  # nothing is sent for what nobody sees
+        box = next(b for b in viewer.switches if b.label == "rigid twin")
+        box.value = True
+        deadline = time.monotonic() + 10
+        expected = named(motions, "rigid twin", MeshLayer).transforms[30, 3, :3, 3]
+        while not np.allclose(link.position, expected, atol=1e-6) and time.monotonic() < deadline:
+            time.sleep(0.01)
+        np.testing.assert_allclose(link.position, expected, atol=1e-6)
+        root = viewer.server.scene.get_handle_by_name("/rigid twin")
+        assert root is not None
+        assert root.visible
+
+
 def test_it_plays_in_real_time_and_stops_at_the_end(twin):
     with serving(twin, port=0) as viewer:
         viewer._loop.value = False
