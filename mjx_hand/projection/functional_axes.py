@@ -22,6 +22,7 @@ MIN_FRAMES = 10  # fewer say little about a joint's four or five numbers
 MAX_FRAMES = 4096  # more are thinned evenly: neighbouring frames say the same
 _PADDING = 256  # frames are padded to a multiple of this, so that most recordings share a compilation
 _ITERATIONS = 30
+_LEAST_SINE = 0.2  # of the angle between a base joint's axes, below which they say little about order and sign
 _LEAST_STIFFNESS = 1e-9  # of a number that nothing holds
 _OUTLIER = np.radians(5.0)  # error of a frame from which on its pull grows no more
 
@@ -62,7 +63,8 @@ def fit_functional_axes(
             Without it all hinges pass through the flat hand, and errors are larger.
 
     Raises:
-        InputError: fewer than ten valid frames, wrong shapes, or valid frames that are not rotations.
+        InputError: fewer than ten valid frames, wrong shapes, valid frames that are not rotations, or a hand with
+            parallel axes at a base joint.
     """
     rotations = np.asarray(rotations)
     used = _valid_frames(rotations, valid)
@@ -81,6 +83,9 @@ def fit_functional_axes(
     padded = np.tile(np.eye(3, dtype=np.float32), (len(weight), NUM_BALL_JOINTS, 1, 1))
     padded[: len(frames)] = frames
     axes = np.array(rigid.hinge_axis, float)
+    pairs = axes[[_HINGES_OF[j] for j in TWO_DOF]]
+    if np.linalg.norm(np.cross(pairs[:, 0], pairs[:, 1]), axis=1).min() < _LEAST_SINE:
+        raise InputError("the hand's abduction and flexion axes are nearly parallel; start from axes='anatomical'")
     rest = np.tile(np.eye(3), (NUM_BALL_JOINTS, 1, 1))
     for joints, kind in ((ONE_DOF, ONE_HINGE), (TWO_DOF, TWO_HINGES)):
         hinges = [_HINGES_OF[j] for j in joints]

@@ -208,3 +208,10 @@ def test_valid_of_another_shape_and_too_few_are_named(rigid):
         fit_functional_axes(rigid, rotations, np.ones(3, bool))
     with pytest.raises(InputError, match="9 of 120 frames"):
         fit_functional_axes(rigid, rotations, np.arange(FRAMES) < 9)
+
+
+def test_a_hand_with_parallel_axes_is_refused(rigid):
+    axes = np.array(rigid.hinge_axis)
+    axes[0] = axes[1]
+    with pytest.raises(InputError, match="nearly parallel"):
+        fit_functional_axes(replace(rigid, hinge_axis=axes), rotations_of(rigid, motion_angles(rigid)))
