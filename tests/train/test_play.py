@@ -1,0 +1,77 @@
+import dataclasses
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from envs.rolling import make_roll_out
+from mjx_hand.errors import InputError
+from mjx_hand.motion.resample import quaternion_matrices
+from mjx_hand.view.scene import Layer, MeshLayer
+from mjx_hand.view.viewer import Viewer
+from tests.view.browser import find_chromium, page
+from train.config import Config
+from train.experiment import chosen_checkpoint, make_world
+from train.options import Play
+from train.play import viewer
+from train.policy import deterministic_policy
+from train.ppo import Point
+
+Trained = tuple[Path, list[Point]]
+
+
+@pytest.fixture(scope="module")
+def playing(trained: Trained, tiny: Config) -> Iterator[Viewer]:
+    shown = viewer(dataclasses.replace(tiny, play=Play(port=0)))
+    yield shown
+    shown.close()
+
+
+def layer(shown: Viewer, name: str) -> MeshLayer:
+    found: Layer = next(layer for layer in shown.scene.layers if layer.name == name)
+    assert isinstance(found, MeshLayer)
+    return found
+
+
+def test_it_shows_where_twin_and_object_were(playing: Viewer, tiny: Config):
+    world = make_world(tiny, "heldout")
+    checkpoint = chosen_checkpoint(tiny, world.env.observation_size)
+    policy = deterministic_policy(tiny.ppo, world.env.observation_size, world.env.action_size)
+    rollouts = make_roll_out(world.env, world.hands, policy)(checkpoint.policy)
+    frames = playing.scene.num_frames
+    assert frames == rollouts.counted[0].sum()
+    np.testing.assert_allclose(layer(playing, "twin").transforms[..., :3, 3], rollouts.joints[0, :frames], atol=1e-5)
+    np.testing.assert_allclose(
+        layer(playing, "demonstration").transforms[..., :3, 3], rollouts.joints_reference[0, :frames], atol=5e-3
+    )
+    thing = layer(playing, "object").transforms[:, 0]
+    np.testing.assert_allclose(thing[:, :3, 3], rollouts.object_pose[0, :frames, :3], atol=1e-6)
+    np.testing.assert_allclose(thing[:, :3, :3], quaternion_matrices(rollouts.object_pose[0, :frames, 3:]), atol=1e-5)
+    away = np.linalg.norm(rollouts.object_pose[0, :frames, :3] - rollouts.object_reference[0, :frames, :3], axis=1)
+    np.testing.assert_allclose(playing.scene.curves[0].values, 100 * away, atol=1e-3)
+    assert playing.scene.title.startswith("tiny 0: ")
+
+
+def test_a_demonstration_that_is_not_there(trained: Trained, tiny: Config):
+    with pytest.raises(InputError, match=r"play.demonstration is 5; there are 1, numbered from 0"):
+        viewer(dataclasses.replace(tiny, play=Play(demonstration=5, port=0)))
+    with pytest.raises(InputError, match=r"play.demonstration is -1"):
+        Play(demonstration=-1)
+
+
+def test_a_browser_shows_it(playing: Viewer, tmp_path: Path):
+    chromium = find_chromium()
+    if chromium is None:
+        pytest.skip("no Chromium to look at the page with")
+    with page(chromium, playing.url, tmp_path) as opened:
+        playing.show(playing.scene.num_frames // 2)
+        deadline, share = time.monotonic() + 60, 0.0
+        while share < 0.003 and time.monotonic() < deadline:
+            time.sleep(0.5)
+            red, green, blue = np.moveaxis(opened.picture()[:, :850].astype(int), -1, 0)
+            share = ((red - blue > 30) & (red > green)).mean()  # the object's orange on a grey page
+        if share > 0.003:
+            (tmp_path / "seen").touch()
+    assert (tmp_path / "seen").exists(), "no object was drawn within a minute"
