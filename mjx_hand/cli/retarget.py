@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 import tyro
 
+from mjx_hand.capture.datasets.dataset_format import dataset_formats
 from mjx_hand.capture.load import load_motion
 from mjx_hand.cli.output import print_table, spread
 from mjx_hand.errors import InputError
@@ -48,8 +49,8 @@ def retarget(
     where it was; a file that cannot be used is reported, the rest is done, and the exit status is 1.
 
     Args:
-        recording: a motion: the project's own .npz, a file or folder of a dataset (docs/datasets.md), or, with
-            --pattern or for a folder of .npz files, a folder of recordings.
+        recording: a motion: the project's own .npz, or a file or folder of a dataset (docs/datasets.md). Any other
+            folder, or one given with --pattern, is a folder of recordings.
         out: the .npz to write (joint angles in rad, wrist poses); for a folder of recordings, a folder.
         method: how rotations become angles: exact, or for comparison paper, bch2, naive.
         axes: hinge axes: anatomical, from the joint centres, or functional, fitted to the recording's own rotations.
@@ -65,7 +66,7 @@ def retarget(
         fps: frames a second, where the recording does not say.
     """
     options = RetargetOptions(method=method, carry=carry, limits=limits, refine=refine, smooth=smooth)
-    if pattern is not None or (recording.is_dir() and any(recording.rglob("*.npz"))):
+    if pattern is not None or (recording.is_dir() and not any(f.recognises(recording, {}) for f in dataset_formats())):
         for name, value in (("--plot", plot), ("--sequence", sequence)):
             if value is not None:
                 raise InputError(f"{name} is for one recording, and {recording} is a folder of them; leave it out")
