@@ -34,6 +34,7 @@ def human_objective(smoothness: float = SMOOTHNESS) -> Objective:
         human_origins=nowhere,
         human_tasks=every,
         free_base=True,
+        second_order=False,
     )
 
 

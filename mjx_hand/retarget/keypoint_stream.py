@@ -54,11 +54,11 @@ class StreamedPose:
         seen: False where too few keypoints were seen and the pose before was held.
     """
 
-    dofs: Float[np.ndarray, "n"]
-    base_position: Float[np.ndarray, "3"]
-    base_quaternion: Float[np.ndarray, "4"]
-    value: float
-    seen: bool
+    dofs: Float[np.ndarray | Array, "n"]
+    base_position: Float[np.ndarray | Array, "3"]
+    base_quaternion: Float[np.ndarray | Array, "4"]
+    value: Float[np.ndarray | Array, ""]
+    seen: Bool[np.ndarray | Array, ""]
 
 
 def start_state(tree: KinematicTree, objective: Objective) -> StreamState:
@@ -85,8 +85,8 @@ def follow(
     tree: KinematicTree,
     objective: Objective,
     low_pass: float | Array,
-) -> StreamState:
-    """The state after one more frame; a frame with too few keypoints changes nothing but `seen`.
+) -> tuple[StreamState, StreamedPose]:
+    """The state after one more frame, and what to show; a frame with too few keypoints changes nothing but `seen`.
 
     Args:
         state: of `start_state`, or after the frame before.
@@ -115,7 +115,15 @@ def follow(
         seen=jnp.array(True),
         value=value[0],
     )
-    return jax.tree.map(lambda new, old: jnp.where(seen, new, old), after, replace(state, seen=jnp.array(False)))
+    state = jax.tree.map(lambda new, old: jnp.where(seen, new, old), after, replace(state, seen=jnp.array(False)))
+    pose = StreamedPose(
+        dofs=state.shown.values[:, 0],
+        base_position=state.shown.position[:, 0],
+        base_quaternion=matrix_to_quaternion(state.shown.rotation[..., 0]),
+        value=state.value,
+        seen=state.seen,
+    )
+    return state, pose
 
 
 def _part_way(old: Posture, new: Posture, share: Array) -> Posture:
@@ -170,18 +178,8 @@ class KeypointStream:
             raise InputError(f"keypoints have shape {given.shape}; give one frame of 21 x 3 numbers (m)")
         if (np.abs(given) > 1e3).any():
             raise InputError("keypoints lie kilometres away or are infinite; give metres, and NaN where one is missing")
-        self.state = self._follow(given)
-        shown = self.state.shown
-        return StreamedPose(
-            dofs=np.asarray(shown.values)[:, 0],
-            base_position=np.asarray(shown.position)[:, 0],
-            base_quaternion=np.asarray(_quaternion(shown.rotation[..., 0])),
-            value=float(self.state.value),
-            seen=bool(self.state.seen),
-        )
+        self.state, pose = self._follow(given)
+        return jax.tree.map(np.asarray, pose)
 
-    def _follow(self, keypoints: np.ndarray) -> StreamState:
+    def _follow(self, keypoints: np.ndarray) -> tuple[StreamState, StreamedPose]:
         return follow(self.state, keypoints, self._tree, self._objective, self._low_pass)
-
-
-_quaternion = jax.jit(matrix_to_quaternion)

@@ -80,8 +80,11 @@ def retarget_keypoints(
         coarse, fine: iterations of every eighth frame, then of all.
 
     Raises:
-        InputError: no frames, not 21 keypoints, infinite or huge coordinates, or no frame with enough keypoints.
+        InputError: no frames, not 21 keypoints, infinite or huge coordinates, no frame with enough keypoints, or
+            iterations out of range.
     """
+    if not (coarse > 0 and 0 < fine <= CHUNK // 4):
+        raise InputError(f"coarse and fine are {coarse} and {fine}; give at least 1, and fine up to {CHUNK // 4}")
     given = check_keypoints(keypoints)
     *batch, frames = given.shape[:-2]
     flat = jnp.asarray(given.reshape(-1, *given.shape[-2:]), jnp.float32)

@@ -81,7 +81,7 @@ def place(posture: Posture, tree: KinematicTree, objective: Objective) -> Placed
 
 
 def linearise(posture: Posture, targets: Targets, tree: KinematicTree, objective: Objective) -> Equations:
-    """Value, gradient and Hessian at a posture."""
+    """Value, gradient and Hessian (or, as the objective says, Gauss and Newton's part of it) at a posture."""
     like = posture.values[0]
     placed = stage(lambda: place(posture, tree, objective), like)
     return stage(lambda: _equations(placed, posture, targets, tree, objective), like)
@@ -115,11 +115,12 @@ def _equations(
             gradient[row] = plus(gradient[row], dot(pull, total[row]))
             stiffened = [product(s, x) for s, x in zip(stiff, total[row], strict=True)]
             stiffness[row] = plus(stiffness[row], dot(stiffened, total[row]))
-            bent = curve(total[row])
+            bent = curve(total[row]) if objective.second_order else stiffened
             for column in (c for c in total if c <= row):
                 _add(hessian, row, column, dot(bent, total[column]))
-    for point, moving in movers.items():
-        _add_turning(hessian, pulls[point], moving)
+    if objective.second_order:
+        for point, moving in movers.items():
+            _add_turning(hessian, pulls[point], moving)
     return Equations(value=value, gradient=gradient, hessian=hessian, stiffness=stiffness)
 
 

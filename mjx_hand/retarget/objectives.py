@@ -44,6 +44,8 @@ class Objective:
         human_origins, human_tasks: the keypoints in their places; BASE for the frame's origin.
         free_base: the base moves freely too, and the points are where the keypoints are; else it stands still at the
             origin.
+        second_order: steps use the full Hessian, which pays where targets are out of reach; else Gauss and Newton's
+            part of it, which pays where they are within.
     """
 
     scaling: Float[np.ndarray | Array, ""] | float = 1.0
@@ -57,6 +59,7 @@ class Objective:
     human_origins: tuple[int, ...] = static()
     human_tasks: tuple[int, ...] = static()
     free_base: bool = static(default=False)
+    second_order: bool = static(default=True)
 
 
 @pytree

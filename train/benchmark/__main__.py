@@ -1,4 +1,4 @@
-"""`python -m train.benchmark [engines|retarget]`: what this machine does; both where none is named."""
+"""`python -m train.benchmark [engines|keypoints|retarget]`: what this machine does; all where none is named."""
 
 import sys
 from collections.abc import Sequence
@@ -7,9 +7,9 @@ import tyro
 
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
-from train.benchmark import engines, retarget
+from train.benchmark import engines, keypoints, retarget
 
-MODULES = {"engines": engines, "retarget": retarget}
+MODULES = {"engines": engines, "keypoints": keypoints, "retarget": retarget}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
