@@ -14,8 +14,9 @@ from mjx_hand.rigid.rigid_hand import RigidHand
 
 TIMESTEP = 0.004  # s; 10 ms loses every grasp, 6.7 ms a third of them
 OBJECT, SUPPORT, TABLE = "object", "support", "table"
-# Of the hand with the object, and again of the object with the ground: the deepest contacts, the nearest pairs.
-MJX_CAPS = {"max_contact_points": 16, "max_geom_pairs": 12}
+# Of the hand with the object, and again of the object with the ground: the deepest contacts, the nearest pairs. A fist
+# around a handle has 13 of each, the other types fewer.
+MJX_CAPS = {"max_contact_points": 16, "max_geom_pairs": 16}
 NUM_WRIST = 6  # actuated wrist joints, before the hinges in qpos and ctrl
 
 # Who meets whom: (contype, conaffinity). The hand meets the object alone; the object also boxes and table.
