@@ -107,7 +107,7 @@ def check_scale(track: Track, rest: Float[Array, "m 3"], palm: Float[Array, "m"]
         hint = (
             "millimetres were taken for metres: read it with --units mm"
             if wrong == 3 and ratio > 1
-            else "check its unit"
+            else "check its unit: --units"
         )
         raise InputError(f"{track.recording.source or 'recording'}: the hand is {times}; {hint}")
 
