@@ -16,9 +16,9 @@ from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import LINKS, NUM_LINKS, PARENTS, TIP_LINKS
 from mjx_hand.hand.model import HandModel
 
-# Painted weights are rougher than borders should be: rounds of averaging over neighbours, and the average's share.
-# More of either moves borders away from where rigid links follow the skin best.
-SMOOTHING, SMOOTHED = 8, 0.6
+# Painted weights are rougher than borders should be: how far they are averaged (m), and the average's share. More of
+# either moves borders away from where rigid links follow the skin best.
+SMOOTHING, SMOOTHED = 0.0147, 0.6
 # How far skin may reach behind a phalanx's own joint, in bone lengths: none beyond the second figure. When the finger
 # flexes such skin (the thumb's web) would swing out at the back of the hand.
 BEHIND = (0.0, 0.2)
@@ -62,11 +62,12 @@ def link_pull(hand: HandModel) -> Float[np.ndarray, "v 16"]:
     """How strongly each link holds each vertex: its skinning weight, smoothed, and faded out behind its joint."""
     average = _averaging(hand)
     weights = np.asarray(hand.weights, dtype=float)
+    template = np.asarray(hand.template, dtype=float)
+    edge = np.linalg.norm(template[hand.faces] - template[np.roll(hand.faces, 1, axis=1)], axis=-1).mean()
     smooth = weights
-    for _ in range(SMOOTHING):
+    for _ in range(round((SMOOTHING / edge) ** 2)):  # averaging spreads like diffusion: with the square root of rounds
         smooth = average @ smooth
     pull = SMOOTHED * smooth + (1 - SMOOTHED) * weights
-    template = np.asarray(hand.template, dtype=float)
     centres = np.asarray(hand.joint_regressor, dtype=float) @ template
     for link, bone in enumerate(bones(template, centres, np.asarray(hand.tip_vertices))[1:], start=1):
         behind = -(template - centres[link]) @ bone / (bone @ bone)
