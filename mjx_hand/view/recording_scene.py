@@ -18,6 +18,7 @@ from mjx_hand.view.scene import Colour, Curve, Layer, PointLayer, Scene, SkinLay
 MARKER: Colour = (46, 107, 186)
 KEYPOINT: Colour = (38, 130, 120)
 GLASS = 0.55
+NEAR = 0.03  # m from the skin, in the usual frame, up to which a marker is one of the hand's
 
 
 def motion_scene(motion: Motion, hand: HandModel, up: str = "+z") -> Scene:
@@ -48,7 +49,7 @@ def demonstration_scene(demonstration: Demonstration, hand: HandModel) -> Scene:
 
 
 def with_markers(scene: Scene, recording: MarkerRecording) -> Scene:
-    """The scene with the markers that a hand was fitted to, and how far they are from its skin.
+    """The scene with the markers that a hand was fitted to, and how far the hand's own are from its skin.
 
     Raises:
         InputError: the recording has another number of frames, or the scene has no skin.
@@ -59,29 +60,36 @@ def with_markers(scene: Scene, recording: MarkerRecording) -> Scene:
             f"{name}: has {recording.num_frames} frames, the motion {scene.num_frames}; give the pair that belongs"
         )
     points = np.where(recording.visible[..., None], recording.positions, np.nan)
-    curve = Curve("markers from the skin", 1e3 * distance_from_skin(_skin(scene), points), "mm")
+    away = distance_from_skin(_skin(scene), points)
+    usual = [np.median(column[np.isfinite(column)]) if np.isfinite(column).any() else np.inf for column in away.T]
+    away = away[:, np.array(usual) < NEAR]  # the others are on the arm, the body, an object
+    curve = Curve("markers from the skin", 1e3 * _mean(away), "mm")
     layer = PointLayer("markers", points, MARKER, radius=0.0035)
     return replace(scene, layers=(*_see_through(scene), layer), curves=(curve, *scene.curves))
 
 
 def with_keypoints(scene: Scene, seen: Float[np.ndarray, "t 21 3"], fitted: Float[np.ndarray, "t 21 3"]) -> Scene:
     """The scene with the keypoints that its hand was fitted to, and how far (m) the hand's own are from them."""
-    away = np.linalg.norm(fitted - seen, axis=-1)
-    count = np.isfinite(away).sum(axis=1)
-    mean = np.where(count > 0, np.nansum(away, axis=1) / np.maximum(count, 1), np.nan)
+    mean = _mean(np.linalg.norm(fitted - seen, axis=-1))
     layer = PointLayer("keypoints", seen, KEYPOINT, lines=BONES.reshape(-1, 2))
     curve = Curve("keypoints from the hand's", 1e3 * mean, "mm")
     return replace(scene, layers=(*_see_through(scene), layer), curves=(curve, *scene.curves))
 
 
-def distance_from_skin(skin: SkinLayer, points: Float[np.ndarray, "t m 3"]) -> Float[np.ndarray, "t"]:
-    """Mean distance (m) in each frame of the points from the nearest vertex; NaN where none is seen."""
-    out = np.full(len(points), np.nan)
+def distance_from_skin(skin: SkinLayer, points: Float[np.ndarray, "t m 3"]) -> Float[np.ndarray, "t m"]:
+    """Distance (m) of each point from the nearest vertex in each frame; NaN where it is not seen."""
+    out = np.full(points.shape[:2], np.nan)
     for frame, row in enumerate(points):
-        seen = row[np.isfinite(row).all(axis=1)]
-        if len(seen):
-            out[frame] = KDTree(skin_vertices(skin, frame)).query(seen)[0].mean()
+        seen = np.asarray(np.isfinite(row).all(axis=1))
+        if seen.any():
+            out[frame, seen] = KDTree(skin_vertices(skin, frame)).query(row[seen])[0]
     return out
+
+
+def _mean(away: Float[np.ndarray, "t m"]) -> Float[np.ndarray, "t"]:
+    """The mean of each row's numbers; NaN where it has none."""
+    count = np.isfinite(away).sum(axis=1)
+    return np.where(count > 0, np.nansum(away, axis=1) / np.maximum(count, 1), np.nan)
 
 
 def _see_through(scene: Scene) -> tuple[Layer, ...]:

@@ -154,8 +154,10 @@ def check_scene(scene: Scene) -> Scene:
 
 
 def positions(scene: Scene) -> Float[Array, "t n 3"]:
-    """Where the layers' points and bodies are (m), for placing camera and ground; NaN where one is missing."""
-    courses = [
-        layer.points if isinstance(layer, PointLayer) else layer.transforms[..., :3, 3] for layer in scene.layers
-    ]
-    return np.concatenate(courses, axis=1)
+    """Where bodies are (m), or points where there are no bodies; for placing camera and ground. NaN for a missing one.
+
+    Points beside a hand may be a whole person's markers, and would make the hand small.
+    """
+    bodies = [layer.transforms[..., :3, 3] for layer in scene.layers if not isinstance(layer, PointLayer)]
+    points = [layer.points for layer in scene.layers if isinstance(layer, PointLayer)]
+    return np.concatenate(bodies or points, axis=1)

@@ -186,9 +186,11 @@ def test_markers_on_the_skin_are_at_no_distance(motion, motions):
     assert (distance_from_skin(skinned, away) > 0.2).all()
     visible = np.ones(on.shape[:2], bool)
     visible[5] = False
-    recording = MarkerRecording(fps=motion.fps, positions=on, visible=visible, names=("a", "b", "c"))
+    on[:, 2] += [0.0, 0.0, 0.5]  # a marker on something else
+    recording = MarkerRecording(fps=motion.fps, positions=on, visible=visible, names=("a", "b", "pillow"))
     shown = with_markers(motions, recording)
     assert np.isnan(shown.curves[0].values[5])
+    assert np.nanmax(shown.curves[0].values) < 1e-3
     assert np.isnan(named(shown, "markers", PointLayer).points[5]).all()
     with pytest.raises(InputError, match="give the pair that belongs"):
         with_markers(motions, replace(recording, positions=on[1:], visible=visible[1:]))
