@@ -72,7 +72,7 @@ def test_a_demonstration_that_is_not_what_happened_is_found(set_path, tmp_path):
     save_demonstration(d, tmp_path / "train" / "000.npz")
     assert check_part(tmp_path, "train").lift[0] > 0.1
     save_demonstration(dataclasses.replace(d, object_pose=d.object_pose + 0.01), tmp_path / "train" / "000.npz")
-    with pytest.raises(InputError, match="demonstration 0 shows its object more than 5 mm from where it was"):
+    with pytest.raises(InputError, match="demonstration 0 shows its object more than 10 mm from where it was"):
         check_part(tmp_path, "train")
     low = truth.object_pose.copy()
     low[:, 2] = low[0, 2]
