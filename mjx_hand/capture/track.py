@@ -64,7 +64,9 @@ def make_track(recording: MarkerRecording, marker_set: MarkerSet, min_visible: i
     believed = visible & ~excursions(observed, visible, recording.fps)
     frames = np.flatnonzero(believed.sum(axis=1) >= min_visible)
     if frames.size == 0:
-        raise InputError(f"{name}: no frame shows {min_visible} markers of the set; nothing to fit")
+        never = [n for m, n in enumerate(marker_set.names) if not believed[:, m].any()]
+        lacking = f" (never seen: {', '.join(never)})" if never else ""
+        raise InputError(f"{name}: no frame shows {min_visible} markers of the set{lacking}; nothing to fit")
     observed, visible, believed = observed[frames], visible[frames], believed[frames]
     shift = np.einsum("bm,bmc->bc", believed, observed) / believed.sum(axis=1)[:, None]
     observed = np.where(visible[..., None], observed - shift[:, None], 0.0)

@@ -98,7 +98,7 @@ def test_recordings_that_cannot_be_fitted_are_named_and_nothing_is_written(tmp_p
         (write(tmp_path / "cm.c3d", recording, units="cm"), [], "the hand is about 10 times too big; check its unit"),
         (write(tmp_path / "two.c3d", prefixed(recording, "R_", "L_")), [], "some are after 'L_', 'R_': say --prefix"),
         (write(tmp_path / "v.c3d", prefixed(recording, "R:", "L:")), [], "are there two hands"),
-        (write(tmp_path / "few.c3d", few), [], "no frame shows 8 markers"),
+        (write(tmp_path / "few.c3d", few), [], "no frame shows 8 markers of the set (never seen: index_pip, "),
         (tmp_path / "absent.c3d", [], "no such file"),
         (write(tmp_path / "r.c3d", recording), ["--plot", tmp_path / "fit.gif"], "figures are written as .png"),
         (tmp_path / "r.c3d", ["--shape", "big"], "--shape big: no such file; valid are free, fixed"),
