@@ -33,7 +33,7 @@ from mjx_hand.rotations import matrix_to_quaternion
 CHUNK = 256  # frames solved in one call: its arrays stay in the processor's cache
 STRIDE = 8  # frames between those that are solved first
 COARSE, FINE = 20, 6  # iterations of those, and then of all frames
-REST_HOLD = 1e-7  # draws degrees of freedom that nothing else determines to the rest posture
+REST_HOLD = 1e-8  # draws degrees of freedom that nothing else determines to the rest posture
 
 
 @pytree
@@ -184,7 +184,7 @@ def _in_chunks(
     padded = jax.tree.map(lambda a: np.pad(a, [(0, 0)] * (a.ndim - 1) + [(margin, behind)]), frames)
     parameters = jax.device_put((tree, objective))
 
-    def one(first: int) -> tuple[Posture, Array]:
+    def one(first: int) -> tuple[Posture, np.ndarray]:
         solved = solve_chunk(*jax.tree.map(lambda a: a[..., first : first + CHUNK], padded), *parameters, iterations)
         return jax.tree.map(lambda a: np.asarray(a)[..., margin : margin + inner], solved)
 

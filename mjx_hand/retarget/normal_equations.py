@@ -136,8 +136,9 @@ def _movers(point: int, placed: Placed, tree: KinematicTree, base: Base | None) 
     found = []
     if base is not None:
         lever = subtract(place, base.origin)
-        found += [_Mover(k, 1.0, axis, cross(axis, lever)) for k, axis in enumerate(_AXES)]
+        # Shifts first: the base turns about its own origin, so that a turn leaves them as they are.
         found += [_Mover(3 + k, 1.0, None, axis) for k, axis in enumerate(_AXES)]
+        found += [_Mover(k, 1.0, axis, cross(axis, lever)) for k, axis in enumerate(_AXES)]
     for joint in ancestors(tree, tree.point_joints[point]):
         axis, slope, unknown = placed.axes[joint], jnp.asarray(tree.slope)[joint], first + tree.dofs[joint]
         if tree.slides[joint]:
