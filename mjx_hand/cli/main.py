@@ -1,31 +1,20 @@
 """The command `mjx-hand`: one file a subcommand beside this one."""
 
+import importlib
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import tyro
 
-from mjx_hand.cli.build import build
-from mjx_hand.cli.fit import fit
-from mjx_hand.cli.info import info
-from mjx_hand.cli.keypoints import keypoints
-from mjx_hand.cli.retarget import retarget
-from mjx_hand.cli.robot import robot
-from mjx_hand.cli.track import track
-from mjx_hand.cli.view import view
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 
-COMMANDS = {
-    "build": build,
-    "fit": fit,
-    "info": info,
-    "keypoints": keypoints,
-    "retarget": retarget,
-    "robot": robot,
-    "track": track,
-    "view": view,
-}
+COMMANDS = ("build", "fit", "info", "keypoints", "retarget", "robot", "track", "view")
+
+
+def _function(command: str) -> Callable[..., Any]:
+    return getattr(importlib.import_module(f"mjx_hand.cli.{command}"), command)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -39,9 +28,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     Raises:
         SystemExit: by tyro, after `--help` (0) and for unknown or missing options (2).
     """
+    argv = sys.argv[1:] if argv is None else argv
     try:
         enable_compile_cache()
-        status = tyro.extras.subcommand_cli_from_dict(COMMANDS, prog="mjx-hand", args=argv)
+        if argv and argv[0] in COMMANDS:  # one command's module alone: importing all of them takes a second
+            status = tyro.cli(_function(argv[0]), prog=f"mjx-hand {argv[0]}", args=argv[1:])
+        else:
+            functions = {command: _function(command) for command in COMMANDS}
+            status = tyro.extras.subcommand_cli_from_dict(functions, prog="mjx-hand", args=argv)
     except InputError as error:
         print(f"mjx-hand: {error}", file=sys.stderr)
         return 2

@@ -8,7 +8,7 @@ import numpy as np
 BACKDROP = (0.90, 0.91, 0.93)
 SKIN = (0.86, 0.66, 0.55, 1.0)
 COLLISION_GROUP = 3  # as `rigid.mjcf` has it
-CREASE_FILL = 0.94
+HIDDEN_GROUP = 5
 
 
 def studio_model(model: mujoco.MjModel, width: int, height: int) -> mujoco.MjModel:
@@ -25,23 +25,20 @@ def studio_model(model: mujoco.MjModel, width: int, height: int) -> mujoco.MjMod
     shown.vis.headlight.ambient[:] = 0.28
     shown.vis.headlight.diffuse[:] = 0.22
     shown.vis.headlight.specular[:] = 0.0
-    _fill_creases(shown)
+    _draw_links_once(shown)
     planes = shown.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
     shown.geom_size[planes, :2] = 0.0  # endless
     return shown
 
 
-def _fill_creases(model: mujoco.MjModel) -> None:
-    """Draw the capsules, a little slimmer, in the colour of their bodies' meshes: bent joints then have no gaps."""
-    capsules = (model.geom_group == COLLISION_GROUP) & (model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE)
-    for capsule in np.flatnonzero(capsules):
-        meshes = (model.geom_bodyid == model.geom_bodyid[capsule]) & (model.geom_type == mujoco.mjtGeom.mjGEOM_MESH)
-        if meshes.any():
-            mesh = int(np.argmax(meshes))
-            model.geom_matid[capsule], model.geom_rgba[capsule] = model.geom_matid[mesh], model.geom_rgba[mesh]
-            model.geom_size[capsule, 0] *= CREASE_FILL
+def _draw_links_once(model: mujoco.MjModel) -> None:
+    """Hide the collision shapes of bodies that have meshes; those of the others, in skin colour, are all there is."""
+    meshes = (model.geom_type == mujoco.mjtGeom.mjGEOM_MESH) & (model.geom_group != COLLISION_GROUP)
+    for shape in np.flatnonzero(model.geom_group == COLLISION_GROUP):
+        if (meshes & (model.geom_bodyid == model.geom_bodyid[shape])).any():
+            model.geom_group[shape] = HIDDEN_GROUP
         else:
-            model.geom_rgba[capsule] = SKIN
+            model.geom_rgba[shape] = SKIN
 
 
 def light_scene(scene: mujoco.MjvScene, camera: mujoco.MjvCamera) -> None:

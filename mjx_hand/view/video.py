@@ -16,7 +16,7 @@ from mjx_hand.motion.archive import replacing
 from mjx_hand.view.camera import Camera, camera_path
 from mjx_hand.view.encoder import encoder
 from mjx_hand.view.renderer import open_renderer
-from mjx_hand.view.studio import light_scene, studio_model
+from mjx_hand.view.studio import COLLISION_GROUP, light_scene, studio_model
 
 Frame = UInt8[np.ndarray, "h w 3"]
 
@@ -67,7 +67,7 @@ def _frames(
     shown = studio_model(model, *size)
     data = mujoco.MjData(shown)
     option = mujoco.MjvOption()
-    option.geomgroup[3] = 1  # the collision shapes too: studio_model() makes them part of the look
+    option.geomgroup[COLLISION_GROUP] = 1  # of links that have no mesh, by studio_model()
     label = _Caption(caption, size) if caption else None
     with open_renderer(shown, *size) as renderer:
         for row, view in zip(qpos, path, strict=True):
