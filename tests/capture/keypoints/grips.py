@@ -1,5 +1,7 @@
 """Motions that the tests know the keypoints of: fingers closing and opening, each in its own rhythm, hinges alone."""
 
+from functools import lru_cache
+
 import jax.numpy as jnp
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -8,16 +10,21 @@ from mjx_hand.capture.keypoints.layouts import hand_keypoints
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion import Motion
 from mjx_hand.rigid.build import build_rigid_hand
-from mjx_hand.rigid.rigid_hand import joint_rotations
+from mjx_hand.rigid.rigid_hand import RigidHand, joint_rotations
 
 FPS, FRAMES = 50.0, 60
 Array = np.ndarray
 
 
+@lru_cache
+def _rigid(side: str, shape: tuple[float, ...]) -> RigidHand:
+    return build_rigid_hand(load_hand(side=side), np.array(shape))
+
+
 def grip(side: str = "right", shape: Array | None = None, spread: float = 1.0) -> Motion:
     """A hand that closes and opens while its wrist turns; `spread` scales abduction."""
     shape = np.zeros(10) if shape is None else shape
-    rigid = build_rigid_hand(load_hand(side=side), shape)
+    rigid = _rigid(side, tuple(shape.tolist()))
     time = np.arange(FRAMES) / FRAMES
     phase = np.arange(20)
     swing = 0.5 + 0.45 * np.sin(2 * np.pi * (time[:, None] + 0.13 * phase))
