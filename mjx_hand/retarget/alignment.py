@@ -10,7 +10,7 @@ from mjx_hand.retarget.objectives import Objective, Targets
 from mjx_hand.rotations import quaternion_to_matrix
 
 _FINGERS = 0.05  # weight of a point on a finger, where its joints may be far from their values, beside one of the palm
-_SQUARINGS = 8  # the largest eigenvalue's share grows as a power of 2^8
+_SQUARINGS = 14  # the largest eigenvalue's share grows as a power of 2^14
 
 
 def aligned(values: Float[Array, "n b"], targets: Targets, tree: KinematicTree, objective: Objective) -> Posture:

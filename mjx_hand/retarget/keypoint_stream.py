@@ -19,7 +19,8 @@ from mjx_hand.retarget.normal_equations import Posture
 from mjx_hand.retarget.objectives import Objective, brought_together, human_vectors, num_thumb_pairs, targets_of
 from mjx_hand.rotations import exp, log, matrix_to_quaternion
 
-FIRST, NEXT = 40, 5  # iterations for the first frame, which starts from the rest posture, and for each one after it
+FIRST = 40  # iterations for the first frame, which starts from the rest posture
+NEXT = 5  # and for each one after it
 
 
 @pytree
@@ -85,6 +86,7 @@ def follow(
     tree: KinematicTree,
     objective: Objective,
     low_pass: float | Array,
+    iterations: int | Array = NEXT,
 ) -> tuple[StreamState, StreamedPose]:
     """The state after one more frame, and what to show; a frame with too few keypoints changes nothing but `seen`.
 
@@ -93,6 +95,7 @@ def follow(
         keypoints: m; NaN where one is missing.
         tree, objective: the hand and what it is to do.
         low_pass: share of the way from the pose shown before to the new one; 1 shows the new one.
+        iterations: of the solver. What they leave is made up for in the next frames.
     """
     vectors = human_vectors(jnp.asarray(keypoints)[None], objective)
     together = brought_together(vectors, objective, jnp.ones(1, bool), state.together)
@@ -105,7 +108,7 @@ def follow(
         strength=jnp.where(state.started, jnp.asarray(objective.smoothness), 0.0)[None],
         linked=jnp.zeros(1),
     )
-    posture, value = improve(begin, targets, holds, tree, objective, jnp.where(state.started, NEXT, FIRST))
+    posture, value = improve(begin, targets, holds, tree, objective, jnp.where(state.started, iterations, FIRST))
     shown = _part_way(state.shown, posture, jnp.where(state.started, low_pass, 1.0))
     after = StreamState(
         posture=posture,
@@ -143,20 +146,24 @@ class KeypointStream:
     The first call compiles for some seconds, unless `warm_up` was called before.
     """
 
-    def __init__(self, tree: KinematicTree, objective: Objective, low_pass: float = 1.0):
+    def __init__(self, tree: KinematicTree, objective: Objective, low_pass: float = 1.0, iterations: int = NEXT):
         """Prepare to follow.
 
         Args:
             tree: the hand.
             objective: what it is to do.
             low_pass: see `follow`; smaller is smoother and later.
+            iterations: for each frame after the first; more follow fast movements more closely, and take longer.
 
         Raises:
-            InputError: `low_pass` is not in (0, 1].
+            InputError: `low_pass` is not in (0, 1], or no iterations.
         """
+        if iterations < 1:
+            raise InputError(f"iterations is {iterations}; give at least 1")
         if not 0 < low_pass <= 1:
             raise InputError(f"low_pass is {low_pass}; give a number above 0 and up to 1, which filters nothing")
-        self._tree, self._objective, self._low_pass = jax.device_put((tree, objective, jnp.float32(low_pass)))
+        settings = (tree, objective, jnp.float32(low_pass), jnp.int32(iterations))
+        self._tree, self._objective, self._low_pass, self._iterations = jax.device_put(settings)
         self.reset()
 
     def reset(self) -> None:
@@ -167,8 +174,8 @@ class KeypointStream:
         """Compile, without following anything."""
         jax.block_until_ready(self._follow(np.zeros((21, 3), np.float32)))
 
-    def step(self, keypoints: Float[np.ndarray, "21 3"]) -> StreamedPose:
-        """Follow one frame: keypoints in metres, NaN where one is missing.
+    def step(self, keypoints: np.ndarray) -> StreamedPose:
+        """Follow one frame: (21, 3) keypoints in metres, NaN where one is missing.
 
         Raises:
             InputError: not 21 points, or coordinates that cannot be metres.
@@ -182,4 +189,4 @@ class KeypointStream:
         return jax.tree.map(np.asarray, pose)
 
     def _follow(self, keypoints: np.ndarray) -> tuple[StreamState, StreamedPose]:
-        return follow(self.state, keypoints, self._tree, self._objective, self._low_pass)
+        return follow(self.state, keypoints, self._tree, self._objective, self._low_pass, self._iterations)

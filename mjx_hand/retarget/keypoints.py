@@ -63,7 +63,7 @@ def rest_posture(tree: KinematicTree) -> Float[Array, "n"]:
 
 
 def retarget_keypoints(
-    keypoints: Float[np.ndarray | Array, "*b t 21 3"],
+    keypoints: np.ndarray | Array,
     tree: KinematicTree,
     objective: Objective,
     *,
@@ -73,8 +73,8 @@ def retarget_keypoints(
     """Follow recordings of keypoints; leading axes are recordings of one length, solved side by side.
 
     Args:
-        keypoints: m, in the order of `capture.keypoints.layouts.KEYPOINTS`; NaN where one is missing. For an objective
-            whose base stands still, in the base's frame (`palm_frame.in_palm`).
+        keypoints: (..., frames, 21, 3), m, in the order of `capture.keypoints.layouts.KEYPOINTS`; NaN where one is
+            missing. For an objective whose base stands still, in the base's frame (`palm_frame.in_palm`).
         tree: the hand.
         objective: what it is to do.
         coarse, fine: iterations of every eighth frame, then of all.
