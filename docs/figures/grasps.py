@@ -1,0 +1,32 @@
+"""The picture of docs/demonstrations.md: one demonstration of each grasp type, a row each, at six moments.
+
+`python docs/figures/grasps.py [FOLDER]` makes a small set of each type below FOLDER (outputs/demonstrations).
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from envs.demonstrations.contact_sheet import contact_sheet
+from envs.demonstrations.dataset import SetSettings, load_part, make_set, twins
+from mjx_hand.view.progress import shares
+
+TYPES = ("power", "cylindrical", "spherical", "pinch", "lateral")
+
+
+def main(root: Path) -> None:
+    """Write grasps.png beside this file."""
+    rows = []
+    for name in TYPES:
+        with shares() as report:
+            folder = make_set(SetSettings(name, people=1, heldout_people=1, trials=2), root, report)
+        demonstrations = load_part(folder, "train")
+        rows.append(contact_sheet(demonstrations, twins(demonstrations), rows=1, size=200))
+    picture = Image.fromarray(np.concatenate(rows)).quantize(128)
+    picture.save(Path(__file__).with_name("grasps.png"), optimize=True)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("outputs/demonstrations"))
