@@ -1,0 +1,40 @@
+"""`mjx-hand robot`: recordings onto a robot hand, from the file to the file."""
+
+import numpy as np
+import pytest
+
+from mjx_hand.cli.main import main
+from mjx_hand.retarget.robot_motion import load_robot_motion
+from tests.retarget.robots import urdf_of
+
+
+def test_keypoints_become_the_robots_joints(recordings, tmp_path, capsys):
+    video, out = recordings / "mediapipe_video/joints.npz", tmp_path / "inspire.npz"
+    urdf = str(urdf_of("inspire"))
+    assert main(["robot", str(video), "--urdf", urdf, "--robot", "inspire", "--out", str(out)]) == 0
+    assert "a right hand, 621 frames" in capsys.readouterr().out
+    motion = load_robot_motion(out)
+    assert motion.values.shape == (621, len(motion.joint_names))
+    leader, tied = (motion.joint_names.index(f"index_{name}_joint") for name in ("proximal", "intermediate"))
+    np.testing.assert_allclose(motion.values[:, tied], 1.06399 * motion.values[:, leader] - 0.04545, atol=1e-5)
+    assert motion.valid.all()
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"--robot": "robonaut"}, "robot is 'robonaut'; valid: ability,"),
+        ({"--urdf": "absent.urdf"}, "absent.urdf: no such file"),
+        ({"--robot": "allegro"}, "has no link 'wrist'"),
+        ({"recording": "absent.npz"}, "absent.npz: no such file"),
+    ],
+)
+def test_bad_input_ends_in_one_line_and_status_2(changes, message, recordings, tmp_path, capsys):
+    options = {"--urdf": str(urdf_of("inspire")), "--robot": "inspire", "--out": str(tmp_path / "o.npz")}
+    recording = changes.get("recording", str(recordings / "mediapipe_video/joints.npz"))
+    options |= {name: value for name, value in changes.items() if name.startswith("--")}
+    assert main(["robot", recording, *(word for pair in options.items() for word in pair)]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "o.npz").exists()
