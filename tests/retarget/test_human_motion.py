@@ -27,7 +27,7 @@ def recorded(rigid: RigidHand) -> tuple[np.ndarray, np.ndarray, Rotation, np.nda
     rng = np.random.default_rng(0)
     time = np.linspace(0, 2 * np.pi, FRAMES)[:, None]
     swing = 0.5 + 0.45 * np.sin(time * rng.uniform(0.5, 2, 20) + rng.uniform(0, 6, 20))
-    angles = rigid.hinge_lower + swing * (np.asarray(rigid.hinge_upper) - rigid.hinge_lower)
+    angles = np.asarray(rigid.hinge_lower) + swing * (np.asarray(rigid.hinge_upper) - rigid.hinge_lower)
     turns = Rotation.from_rotvec(rng.normal(0, 1, 3) + time * rng.normal(0, 0.5, 3))
     places = rng.normal(0, 0.5, 3) + 0.1 * np.sin(time)
     points = np.asarray(tree_points(angles.astype(np.float32), human_tree(rigid)), float)
