@@ -24,11 +24,12 @@ def test_a_grasp_type_is_complete_and_consistent(name):
         assert contact.link in LINKS
         assert 0 <= contact.along <= 1
     if isinstance(grasp.closing, Pads):
-        for contact in grasp.contacts:
-            assert np.linalg.norm(contact.normal) == pytest.approx(1.0)
-            assert np.dot(contact.aside, contact.normal) == pytest.approx(0.0)
+        normals = [np.array(contact.normal, float) for contact in grasp.contacts]
+        for contact, normal in zip(grasp.contacts, normals, strict=True):
+            assert np.linalg.norm(normal) == pytest.approx(1.0)
+            assert np.dot(contact.aside, normal) == pytest.approx(0.0)
         # The first contact opposes the rest.
-        assert all(np.dot(grasp.contacts[0].normal, c.normal) < 0 for c in grasp.contacts[1:])
+        assert all(np.dot(normals[0], normal) < 0 for normal in normals[1:])
     else:
         assert len(grasp.closing.opened) == len(HINGES)
         lower, upper = anatomical_limits()
