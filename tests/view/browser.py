@@ -14,7 +14,8 @@ from urllib.request import urlopen
 
 import numpy as np
 from PIL import Image
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import connect
+from websockets.sync.connection import Connection
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 # Without a graphics card, and without a word to the network.
@@ -32,7 +33,7 @@ def find_chromium() -> str | None:
 class Page:
     """One page of the browser."""
 
-    def __init__(self, socket: ClientConnection) -> None:
+    def __init__(self, socket: Connection) -> None:
         self._socket, self._ids = socket, itertools.count(1)
 
     def call(self, method: str, **parameters: object) -> dict:
