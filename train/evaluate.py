@@ -23,7 +23,7 @@ from mjx_hand.motion.archive import replacing
 from mjx_hand.view.report import Table
 from train.checkpoint import Checkpoint
 from train.config import Config, command
-from train.experiment import World, chosen_checkpoint, make_world
+from train.experiment import World, chosen_checkpoint, make_world, without_grip
 from train.policy import deterministic_policy
 
 HOLD = 5.0  # s after the demonstration, for the hold metric
@@ -50,7 +50,7 @@ def evaluate_checkpoint(config: Config, part: str = "heldout") -> Results:
     env = world.env
     checkpoint = chosen_checkpoint(config, env.observation_size)
     policy = deterministic_policy(config.ppo, env.observation_size, env.action_size)
-    alone = make_world(config, part, press=False)
+    alone = without_grip(world)
     rollouts = {
         POLICY: make_roll_out(env, world.hands, policy, HOLD)(checkpoint.policy),
         ZERO: make_roll_out(env, world.hands, zero_residual, HOLD)(None),

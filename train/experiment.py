@@ -23,20 +23,20 @@ class World:
     env: TrackingEnv
 
 
-def make_world(config: Config, part: str, *, press: bool = True) -> World:
-    """The environment over one part ("train", "heldout") of the experiment's demonstrations, made where missing.
-
-    Args:
-        config: the experiment.
-        part: which part.
-        press: False replays demonstrations as they are, without the forces that the reference adds.
-    """
+def make_world(config: Config, part: str) -> World:
+    """The environment over one part ("train", "heldout") of the experiment's demonstrations, made where missing."""
     with shares() as report:
         folder = make_set(config.data, config.demonstrations, report)
     demonstrations = load_part(folder, part)
     hands = twins(demonstrations)
-    task = config.task if press else dataclasses.replace(config.task, grip_force=0.0)
-    return World(demonstrations, hands, TrackingEnv(demonstrations, hands, config.engine, task))
+    return World(demonstrations, hands, TrackingEnv(demonstrations, hands, config.engine, config.task))
+
+
+def without_grip(world: World) -> World:
+    """The same with demonstrations replayed as they are, without the forces that the reference adds."""
+    task = dataclasses.replace(world.env.task, grip_force=0.0)
+    env = TrackingEnv(world.demonstrations, world.hands, world.env.engine.name, task)
+    return dataclasses.replace(world, env=env)
 
 
 def chosen_checkpoint(config: Config, observation_size: int) -> Checkpoint:
