@@ -80,10 +80,15 @@ def marker_of(label: str, marker_set: MarkerSet) -> str | None:
     return None
 
 
+def label_starts(labels: tuple[str, ...], marker_set: MarkerSet) -> tuple[str, ...]:
+    """What labels have before a marker's name: the subject's, or the side's."""
+    found = {label[: -len(n)] for label in labels for n in marker_set.names if label.lower().endswith(n.lower())}
+    return tuple(sorted(found - {""}))
+
+
 def _no_match(labels: tuple[str, ...], marker_set: MarkerSet, prefix: str) -> str:
     """What is wrong where no label matches: often all begin with the subject's or the side's name."""
-    found = {label[: -len(n)] for label in labels for n in marker_set.names if label.lower().endswith(n.lower())}
-    starts = ", ".join(map(repr, sorted(found - {""})))
+    starts = ", ".join(map(repr, label_starts(labels, marker_set)))
     if prefix:
         return f"no label is {prefix!r} and a marker of the set" + (f"; some begin with {starts}" if starts else "")
     shown = ", ".join(labels[:6]) + (" and more" if len(labels) > 6 else "")

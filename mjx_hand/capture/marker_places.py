@@ -54,6 +54,18 @@ class MarkerPlace:
     labels: tuple[str, ...] = ()
 
 
+class _NoRepeats(yaml.SafeLoader):
+    """YAML as it is defined: a mapping has each key once. PyYAML would keep the last of two markers of one name."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict:
+        names: list[str] = [key.value for key, _ in node.value]
+        for k, (key, _) in enumerate(node.value):
+            if key.value in names[:k]:
+                problem = f"{key.value!r} is there twice; give each marker its own name"
+                raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
+        return super().construct_mapping(node, deep)
+
+
 def next_joint(joint: str) -> str:
     """The end of the bone that starts at `joint`; for the wrist, the middle finger's knuckle."""
     if joint == "wrist":
@@ -82,7 +94,7 @@ def parse_places(text: str, source: str) -> tuple[MarkerPlace, ...]:
         InputError: the text is not YAML or not of this form.
     """
     try:
-        document = yaml.safe_load(text)
+        document = yaml.load(text, _NoRepeats)
     except yaml.YAMLError as error:
         raise InputError(f"{source}: not YAML ({' '.join(str(error).split())})") from None
     if not isinstance(document, Mapping) or not isinstance(document.get("markers"), Mapping) or not document["markers"]:

@@ -9,15 +9,19 @@ from mjx_hand.capture.keypoints.layouts import KEYPOINTS
 from mjx_hand.capture.keypoints.load import chosen, keypoint_contents, recognised
 from mjx_hand.capture.keypoints.recording import KeypointRecording
 from mjx_hand.capture.keypoints.side import known_side
-from mjx_hand.capture.labels import match_labels
+from mjx_hand.capture.labels import label_starts, match_labels
 from mjx_hand.capture.load_markers import load_markers
 from mjx_hand.capture.marker_set import INCLUDED, included_marker_set
+from mjx_hand.capture.recording import MarkerRecording
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
 from mjx_hand.hand.mano_file import load_mano_file
 from mjx_hand.motion import Demonstration, JointMotion, Motion
+from mjx_hand.retarget.robot_motion import RobotMotion
 
 Facts = tuple[tuple[str, str], ...]
+
+BIGGEST_HAND, BIGGEST_ROOM = 1.0, 30.0  # m; what is bigger is in another unit
 
 
 def motion(found: Motion) -> Facts:
@@ -40,6 +44,18 @@ def joint_motion(found: JointMotion) -> Facts:
         ("gaps", f"{_share(~found.valid)}{', interpolated' if not found.valid.all() else ''}"),
         ("units", "radians, metres, seconds; quaternions wxyz"),
         ("wrist", _travel(found.wrist_position)),
+        ("source", found.source or "not said"),
+    )
+
+
+def robot_motion(found: RobotMotion) -> Facts:
+    """Of a robot hand's motion."""
+    return (
+        ("robot", f"{found.robot or 'not said'}, {len(found.joint_names)} joints: {', '.join(found.joint_names)}"),
+        _frames(len(found.values), found.fps),
+        ("gaps", f"{_share(~found.valid)}{', interpolated' if not found.valid.all() else ''}"),
+        ("units", "radians, metres, seconds; quaternions wxyz"),
+        ("base", _travel(found.base_position)),
         ("source", found.source or "not said"),
     )
 
@@ -89,44 +105,59 @@ def _points(found: KeypointRecording) -> Facts:
     never = [KEYPOINTS[k] for k in np.flatnonzero(~seen.any(axis=0))]
     lacks = f", never {', '.join(never)}" if never else ""
     extent = np.nanmax(found.positions, axis=(0, 1)) - np.nanmin(found.positions, axis=(0, 1))
+    across = np.ptp(found.positions[np.asarray(seen.any(axis=1))], axis=1)
+    doubt = (
+        "; a hand of this size there is not, give --unit to `mjx-hand keypoints`"
+        if np.isfinite(across).any() and np.nanmedian(across.max(axis=-1)) > BIGGEST_HAND
+        else ""
+    )
     return (
         ("keypoints", f"{21 - len(never)} of 21, layout {found.layout}{lacks}"),
         ("gaps", _share(~seen[:, seen.any(axis=0)])),
-        ("units", "metres, as the file's own unit says"),
-        ("extent", f"{' x '.join(f'{e:.3g}' for e in extent)} m over all frames"),
+        ("units", "metres, from the unit that the file says, if it says one"),
+        ("extent", f"{' x '.join(f'{e:.3g}' for e in extent)} m over all frames{doubt}"),
     )
 
 
-def markers(path: Path) -> tuple[Facts, str]:
-    """Of a marker recording: what is in it, and the marker set that suits it best."""
-    found = load_markers(path)
-    hand = load_hand()
-    counts = {}
-    for name in INCLUDED:
-        marker_set = included_marker_set(hand, name)
-        try:
-            counts[name] = len(match_labels(found, marker_set).recording.names) / len(marker_set.names)
-        except InputError:  # none of its labels, or two hands
-            counts[name] = 0.0
-    best = max(counts, key=lambda name: counts[name])
+def markers(path: Path, units: str | None = None) -> tuple[Facts, str]:
+    """Of a marker recording: what is in it, and the options of `mjx-hand fit` that suit it best."""
+    found = load_markers(path, units)
+    suits, options = _suitable_set(found)
     missing = 1 - found.visible.mean(axis=0)
     worst = np.argsort(-missing)[:3]
     holes = ", ".join(f"{found.names[m]} {100 * missing[m]:.1f} %" for m in worst if missing[m] > 0)
-    suits = (
-        f"{best}, of whose markers it has {100 * counts[best]:.0f} %"
-        if counts[best]
-        else "none of " + ", ".join(INCLUDED)
-    )
     at = found.positions[found.visible]
     extent = np.ptp(at, axis=0) if len(at) else np.zeros(3)
+    doubt = "; a room of this size there is not, give --units" if extent.max() > BIGGEST_ROOM else ""
     return (
         ("markers", f"{len(found.names)}: {', '.join(found.names)}"),
         _frames(found.num_frames, found.fps),
         ("gaps", _share(~found.visible) + (f" (most: {holes})" if holes else "")),
-        ("units", "metres, as the file's own unit says"),
-        ("extent", f"{' x '.join(f'{e:.3g}' for e in extent)} m over all frames"),
+        ("units", f"metres, from the file's {units if units else 'own unit'}"),
+        ("extent", f"{' x '.join(f'{e:.3g}' for e in extent)} m over all frames{doubt}"),
         ("marker set", suits),
-    ), best if counts[best] else "MARKER_SET.yaml"
+    ), options + (f" --units {units}" if units else "")
+
+
+def _suitable_set(found: MarkerRecording) -> tuple[str, str]:
+    """The included marker set of which a recording has most, in words and as options."""
+    hand = load_hand()
+    most, suits, options = 0.0, f"none of {', '.join(INCLUDED)}", "--markers MARKER_SET.yaml"
+    for name in INCLUDED:
+        marker_set = included_marker_set(hand, name)
+        starts = label_starts(found.names, marker_set)
+        for start in ("", *starts):
+            try:
+                share = len(match_labels(found, marker_set, start).recording.names) / len(marker_set.names)
+            except InputError:  # none of its labels, or two hands
+                continue
+            if share > most:
+                most, suits = share, f"{name}, of whose markers it has {100 * share:.0f} %"
+                options = f"--markers {name}"
+                if start:
+                    suits += f" after {start!r}" + (f"; labels begin with {', '.join(starts)}" if starts[1:] else "")
+                    options += f" --prefix {start}"
+    return suits, options
 
 
 def mano(path: Path) -> tuple[str, Facts]:

@@ -16,6 +16,8 @@ from mjx_hand.motion import load_demonstration, load_joint_motion
 from mjx_hand.motion.archive import schema_of
 from mjx_hand.motion.demonstration import SCHEMA as DEMONSTRATION
 from mjx_hand.motion.joint_motion import SCHEMA as JOINT_MOTION
+from mjx_hand.retarget.robot_motion import SCHEMA as ROBOT_MOTION
+from mjx_hand.retarget.robot_motion import load_robot_motion
 
 VIDEOS = (".mp4", ".mov", ".avi", ".webm", ".mkv")
 _MANO_KEYS = {"v_template", "J_regressor", "kintree_table"}
@@ -29,21 +31,29 @@ class FileFacts:
         kind: what it is, in a few words.
         facts: what and how much is in it, label and text.
         next: commands that take it further.
+        sound: whether it could be read; else a fact says why not, or which choice it takes.
     """
 
     kind: str
     facts: tuple[tuple[str, str], ...]
     next: tuple[str, ...] = ()
+    sound: bool = True
 
 
 def file_facts(
-    path: Path, side: str | None = None, sequence: str | None = None, mano: Path | None = None, fps: float | None = None
+    path: Path,
+    side: str | None = None,
+    sequence: str | None = None,
+    mano: Path | None = None,
+    fps: float | None = None,
+    units: str | None = None,
 ) -> FileFacts:
     """What a file or folder is, what is in it and what to do with it.
 
     Args:
         path: of the file or folder.
         side, sequence, mano, fps: as `load_motion` takes them, where the recording leaves a choice.
+        units: as `load_markers` takes them, where a marker file does not say its own.
 
     Raises:
         InputError: there is no such file, it is damaged, or nothing here reads it.
@@ -53,19 +63,19 @@ def file_facts(
     if path.is_file() and path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; copy or export it again")
     return (
-        _own(path)
+        _own(path, units)
         or _robot(path)
         or _keypoints(path, side, sequence, fps)
         or _motion(path, side, sequence, mano, fps)
         or _mano(path)
-        or _markers(path)
+        or _markers(path, units)
         or _video(path)
         or _unknown(path)
     )
 
 
-def _own(path: Path) -> FileFacts | None:
-    """Joint motions and demonstrations; motions, markers and keypoints are found among the recordings."""
+def _own(path: Path, units: str | None) -> FileFacts | None:
+    """Joint motions, of robots too, and demonstrations; motions, markers, keypoints are found among the recordings."""
     schema = schema_of(path)
     out = path.with_suffix("")
     if schema == JOINT_MOTION:
@@ -74,8 +84,11 @@ def _own(path: Path) -> FileFacts | None:
     if schema == DEMONSTRATION:
         facts = facts_of.demonstration(load_demonstration(path))
         return FileFacts(f"demonstration ({schema})", facts, (f"mjx-hand view {path}",))
+    if schema == ROBOT_MOTION:
+        load = f"in Python: mjx_hand.retarget.robot_motion.load_robot_motion({str(path)!r})"
+        return FileFacts(f"robot motion ({schema})", facts_of.robot_motion(load_robot_motion(path)), (load,))
     if schema == MARKERS:
-        return _marker_facts(path, f"markers ({schema})", out)
+        return _marker_facts(path, f"markers ({schema})", out, units)
     return None
 
 
@@ -109,7 +122,7 @@ def _motion(
         motion = load_motion(path, side=side, sequence=sequence, mano=mano, fps=fps)
     except InputError as error:
         # Of a known format, but it takes a choice to read it, or it is not sound: its own line says which.
-        return FileFacts(known.name, (("to read it", str(error).removeprefix(f"{path}: ")),))
+        return FileFacts(known.name, (("to read it", str(error).removeprefix(f"{path}: ")),), sound=False)
     commands = (f"mjx-hand view {path}{choice}", f"mjx-hand retarget {path} --out angles.npz{choice}")
     return FileFacts(known.name, facts_of.motion(motion), commands)
 
@@ -122,14 +135,14 @@ def _mano(path: Path) -> FileFacts | None:
     return FileFacts("MANO hand", facts, (f"mjx-hand build --out my_hand --side {side} --mano {path}",))
 
 
-def _markers(path: Path) -> FileFacts | None:
+def _markers(path: Path, units: str | None) -> FileFacts | None:
     known = next((f for f in marker_formats() if path.suffix.lower() in f.suffixes and path.suffix != ".npz"), None)
-    return None if known is None or not path.is_file() else _marker_facts(path, known.name, path.with_suffix(""))
+    return None if known is None or not path.is_file() else _marker_facts(path, known.name, path.with_suffix(""), units)
 
 
-def _marker_facts(path: Path, kind: str, out: Path) -> FileFacts:
-    facts, marker_set = facts_of.markers(path)
-    return FileFacts(kind, facts, (f"mjx-hand fit {path} --markers {marker_set} --out {out.name}.motion.npz",))
+def _marker_facts(path: Path, kind: str, out: Path, units: str | None) -> FileFacts:
+    facts, options = facts_of.markers(path, units)
+    return FileFacts(kind, facts, (f"mjx-hand fit {path} {options} --out {out.name}.motion.npz",))
 
 
 def _video(path: Path) -> FileFacts | None:
@@ -141,6 +154,6 @@ def _video(path: Path) -> FileFacts | None:
 
 def _unknown(path: Path) -> FileFacts:
     names = [f.name for f in (*dataset_formats(), *marker_formats())]
-    names += ["joint motion", "demonstration", "MANO", "URDF", "MJCF"]
+    names += ["joint motion", "robot motion", "demonstration", "MANO", "URDF", "MJCF"]
     short = dict.fromkeys(name.split(" (")[0] for name in names)
     raise InputError(f"{path}: nothing that is known here; known are {', '.join(short)}")

@@ -14,8 +14,11 @@ def info(
     sequence: str | None = None,
     mano: Path | None = None,
     fps: float | None = None,
-) -> None:
+    units: str | None = None,
+) -> int:
     """Say what a file or dataset folder is, what it holds, and what to run next.
+
+    The exit status is 1 for a dataset's recording that cannot be read as it is: what is said is why.
 
     Args:
         file: anything that mjx-hand reads or writes.
@@ -23,11 +26,13 @@ def info(
         sequence: which recording to describe, where there are several.
         mano: a licensed MANO file, for datasets whose poses need one.
         fps: frames a second, where the recording does not say.
+        units: m, cm, mm or in, where a marker file's own unit is wrong or missing.
     """
-    found = file_facts(file, side, sequence, mano, fps)
+    found = file_facts(file, side, sequence, mano, fps, units)
     print(f"{file}: {found.kind}")
     width = max((len(label) for label, _ in found.facts), default=0)
     for label, text in found.facts:
         print(f"  {label:<{width}}  {text}")
     for command in found.next:
         print(f"next: {command}")
+    return 0 if found.sound else 1

@@ -68,6 +68,7 @@ def fit_figure(
         ]
         _hand(axes, vertices, np.asarray(hand.faces), hand.side)
         _markers(axes, *to_hand)
+        _frame(axes, np.concatenate([vertices, to_hand[1]]), hand.side)
         axes.set_title(f"{frame / motion.fps:.1f} s")
     bars, course = below.subplots(1, 2, width_ratios=(1.0, 1.5))
     _bars(bars, report)
@@ -83,8 +84,12 @@ def _hand(axes: Axes3D, vertices: Array, faces: Array, side: str) -> None:
     shade = 0.55 + 0.45 * np.clip(normal @ (LIGHT * mirror / np.linalg.norm(LIGHT)), -0.6, 1.0)
     colours = np.concatenate([np.clip(SKIN * shade[:, None], 0, 1), np.full((len(faces), 1), 0.55)], axis=1)
     axes.add_collection3d(Poly3DCollection(_plot_axes(triangles), facecolors=colours, edgecolors="none"))
-    points = _plot_axes(vertices)
-    middle, reach = (points.max(axis=0) + points.min(axis=0)) / 2, 0.59 * np.ptp(points, axis=0).max()
+
+
+def _frame(axes: Axes3D, shown: Array, side: str) -> None:
+    """Look at these points. Not at the observed markers: a ghost may be anywhere."""
+    points = _plot_axes(shown)
+    middle, reach = (points.max(axis=0) + points.min(axis=0)) / 2, 0.62 * np.ptp(points, axis=0).max()
     for set_limits, centre in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), middle, strict=True):
         set_limits(centre - reach, centre + reach)
     axes.set_box_aspect((1, 1, 1), zoom=2)

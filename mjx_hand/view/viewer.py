@@ -238,6 +238,8 @@ def serving(scene: Scene, port: int = PORT, host: str = "127.0.0.1") -> Iterator
 
 def _free_port(host: str, port: int) -> int:
     """The port, or for 0 one that is free; viser would silently take another where it is not."""
+    if not 0 <= port <= 65535:
+        raise InputError(f"cannot serve at {host}:{port}: ports are 0 to 65535; choose another --port")
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

@@ -60,6 +60,10 @@ def test_ray_against_a_known_triangle():
     [
         ("markers: [", "not YAML"),
         ("a: 1", "not a marker set"),
+        (
+            "markers: {a: {vertex: 3, offset: 0}, b: {vertex: 4, offset: 0}, a: {vertex: 5, offset: 0}}",
+            "'a' is .* twice",
+        ),
         ("markers: {}", "not a marker set"),
         ("unit: mm\nmarkers: {a: {joint: wrist, facing: dorsal, offset: 0}}", "unknown entry unit"),
         ("markers: {a: 3}", "3 is not a place"),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mjx_hand.capture.keypoints.recording import KeypointRecording, save_keypoints
+from mjx_hand.capture.marker_set import included_marker_set
 from mjx_hand.cli.main import main
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.hand.load import load_hand
@@ -118,6 +119,27 @@ def test_real_recordings(recordings, capsys):
     assert "nothing that is known here; known are" in refused(
         capsys, recordings / "dexmv_mustard" / "mustard_bottle.stl"
     )
+
+
+def test_marker_files_say_how_to_fit_them(tmp_path, capsys):
+    """Two hands in a file, one without a unit, and one whose unit is wrong."""
+    names = included_marker_set(load_hand(), "hand22").names
+    positions = np.random.default_rng(0).uniform(0, 200, (3, len(names), 3))
+    columns = [f"{side}{n}_{axis}" for side in ("L_", "R_") for n in names for axis in "xyz"]
+    rows = [",".join(map(str, [*row.ravel(), *(row.ravel() + 500)])) for row in positions]
+    path = tmp_path / "two.csv"
+    path.write_text("\n".join(["# rate: 100", ",".join(columns), *rows]))
+    assert "no unit" in refused(capsys, path)
+    text = info(capsys, path, "--units", "mm")
+    assert "hand22, of whose markers it has 100 % after 'L_'; labels begin with L_, R_" in text
+    assert f"next: mjx-hand fit {path} --markers hand22 --prefix L_ --units mm --out two.motion.npz" in text
+    assert "a room of this size there is not" in info(capsys, path, "--units", "m")
+
+
+def test_a_recording_that_takes_a_choice_is_no_success(tmp_path, capsys):
+    np.savez(tmp_path / "row.npz", mano=np.zeros((2, 61)), joint_transforms=np.zeros((2, 1)), joint_transform_order="x")
+    assert main(["info", str(tmp_path / "row.npz")]) == 1
+    assert "to read it" in capsys.readouterr().out
 
 
 def test_robots(tmp_path, capsys):

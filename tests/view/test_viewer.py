@@ -161,6 +161,8 @@ def test_a_port_that_is_taken_is_said(twin):
         taken = viewer.server.get_port()
         with pytest.raises(InputError, match=f"cannot serve at 127.0.0.1:{taken}"):
             Viewer(twin, port=taken)
+    with pytest.raises(InputError, match="ports are 0 to 65535"):
+        Viewer(twin, port=99999)
 
 
 def test_a_motion_comes_with_its_twin_and_their_difference(motion, motions):

@@ -34,7 +34,8 @@ def load_keypoints(
     """
     path = Path(path)
     if not path.is_file():
-        raise InputError(f"{path}: no such file; give the path of a keypoint file")
+        found = "a folder" if path.is_dir() else "no such file"
+        raise InputError(f"{path}: {found}; give the path of a keypoint file")
     contents = keypoint_contents(path)
     reader = recognised(path, contents)
     if reader is None:

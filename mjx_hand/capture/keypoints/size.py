@@ -12,13 +12,13 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}  # metres in each
 BIGGEST = 1.8  # times the mean hand, or the other way its share; small children's hands are half an adult's
 
 
-def unit_factor(name: str, unit: str) -> float:
+def unit_factor(name: str, unit: object) -> float:
     """Metres in one `unit`.
 
     Raises:
         InputError: the unit is unknown; `name` says where it stands.
     """
-    if unit not in UNITS:
+    if not isinstance(unit, str) or unit not in UNITS:
         raise InputError(f"{name}: unit is {unit!r}; known: {', '.join(UNITS)}")
     return UNITS[unit]
 
@@ -33,6 +33,8 @@ def check_size(name: str, hand: HandModel, observed: Float[np.ndarray, "n"]) -> 
     ratio = float(np.nanmedian(observed[fingers] / lengths(rest_keypoints(hand)[0])[fingers]))
     if 1 / (1.4 * BIGGEST) < ratio < BIGGEST:
         return
+    if not ratio > 0:
+        raise InputError(f"{name}: all keypoints are at one place; is anything recorded there?")
     for unit, metres in UNITS.items():
         if unit != "m" and 1 / BIGGEST < ratio * metres < BIGGEST:
             raise InputError(

@@ -12,6 +12,20 @@ EVEN = 0.1  # share of a frame by which steps may differ and still be one rate
 DROPPED = 1.5  # frames: a longer step is a gap
 
 
+def stated_rate(path: object, name: str, value: object) -> float:
+    """The frames a second that a file says, as a number or as text.
+
+    Raises:
+        InputError: it is no number.
+    """
+    try:
+        if not isinstance(value, bool):
+            return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        pass
+    raise InputError(f"{path}: {name} is {value!r}, expected frames a second, such as 30")
+
+
 def in_seconds(times: Float[Array, "t"]) -> Float[Array, "t"]:
     """Times in seconds, whose unit (s, ms, us or ns) is told by the step: hands are recorded at 1 to 1000 frames/s."""
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0

@@ -234,6 +234,23 @@ def test_bad_files_say_what_is_wrong_in_one_line(tmp_path):
     (tmp_path / "row.csv").write_text(",".join(f"{a}{k}" for k in range(21) for a in "xyz") + "\n1,2,three")
     assert "frame 0 has 3 cells of 63" in refused(tmp_path / "row.csv")
     assert "no such file" in refused(tmp_path / "absent.json")
+    assert "a folder" in refused(tmp_path)
+    np.savez(tmp_path / "fast.npz", joints=good, fps="fast")
+    assert "fps is 'fast', expected frames a second" in refused(tmp_path / "fast.npz")
+    np.savez(tmp_path / "two.npz", joints=good, fps=[30.0, 60.0])
+    assert "fps is [30.0, 60.0], expected frames a second" in refused(tmp_path / "two.npz")
+    header = [f"{a}{k}" for k in range(21) for a in "xyz"]
+    cells = ",".join(map(str, good[0].ravel()))
+    (tmp_path / "fast.csv").write_text("# fps: fast\n" + ",".join(header) + f"\n{cells}")
+    assert "fps is 'fast', expected frames a second" in refused(tmp_path / "fast.csv")
+    (tmp_path / "twice.csv").write_text(",".join([*header, "x0"]) + f"\n{cells},0")
+    assert "columns repeat: x0" in refused(tmp_path / "twice.csv")
+    write_json(tmp_path / "units.json", good.tolist(), fps=30, unit=["mm"])
+    assert "unit is ['mm']; known: m, cm, mm" in refused(tmp_path / "units.json")
+    write_json(tmp_path / "rate.json", good.tolist(), fps="fast")
+    assert "fps is 'fast', expected frames a second" in refused(tmp_path / "rate.json")
+    write_json(tmp_path / "clock.json", [{"time": "12:00", "joints": p.tolist()} for p in good])
+    assert "a frame's time is '12:00'" in refused(tmp_path / "clock.json")
 
 
 def test_several_hands_of_one_side_need_their_name(recordings):

@@ -148,6 +148,8 @@ def broken(recording: KeypointRecording, how: str) -> KeypointRecording:
         positions *= 100
     elif how == "image":
         positions *= 4
+    elif how == "a point":
+        positions[:] = 1.0
     elif how == "nothing":
         positions[:] = np.nan
     elif how == "no thumb tip":
@@ -167,6 +169,7 @@ def broken(recording: KeypointRecording, how: str) -> KeypointRecording:
         ("millimetres", "about 1000 times too big, so positions are in mm"),
         ("centimetres", "about 100 times too big, so positions are in cm"),
         ("image", "4 times too big; give positions in metres"),
+        ("a point", "all keypoints are at one place"),
         ("nothing", "all 60 frames are gaps"),
         ("no thumb tip", "thumb_tip never seen"),
         ("never whole", "no frame shows a whole hand"),

@@ -14,7 +14,7 @@ from mjx_hand.capture.keypoints.files.reader import KeypointReader
 from mjx_hand.capture.keypoints.names import counted_keypoints, named_keypoints
 from mjx_hand.capture.keypoints.recording import SIDES, KeypointRecording, check_keypoints
 from mjx_hand.capture.keypoints.size import unit_factor
-from mjx_hand.capture.keypoints.times import evenly
+from mjx_hand.capture.keypoints.times import evenly, stated_rate
 from mjx_hand.motion.layout import numbers
 
 POINTS = ("joints", "keypoints", "landmarks", "positions", "points", *SIDES)
@@ -43,7 +43,7 @@ def _read(path: Path, arrays: Any, unit: str | None) -> dict[str, KeypointRecord
             positions, layout = counted_keypoints(path, points, said("layout"))
         else:
             positions, layout = named_keypoints(path, [str(n) for n in np.atleast_1d(names)], points)
-        fps = float(arrays["fps"]) if "fps" in arrays else None
+        fps = stated_rate(path, "fps", arrays["fps"].tolist()) if "fps" in arrays else None
         times = next((key for key in TIMES if key in arrays), None)
         if fps is None and times is not None:
             fps, positions = evenly(path, numbers(path, arrays, {times: (len(points),)})[times], positions)

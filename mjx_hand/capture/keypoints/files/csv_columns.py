@@ -15,7 +15,7 @@ from mjx_hand.capture.keypoints.files.reader import KeypointReader
 from mjx_hand.capture.keypoints.names import counted_keypoints, named_keypoints, names_a_hand
 from mjx_hand.capture.keypoints.recording import SIDES, KeypointRecording, check_keypoints
 from mjx_hand.capture.keypoints.size import unit_factor
-from mjx_hand.capture.keypoints.times import evenly
+from mjx_hand.capture.keypoints.times import evenly, stated_rate
 from mjx_hand.errors import InputError
 
 TIMES = ("time", "t", "timestamp", "time_s", "time_ms", "timestamp_ms")
@@ -61,6 +61,9 @@ def _recognises(lines: Any) -> bool:
 
 def _read(path: Path, lines: Any, unit: str | None) -> dict[str, KeypointRecording]:
     said, header, rows = _header(lines)
+    repeated = sorted({cell for cell in header if header.count(cell) > 1})
+    if repeated:
+        raise InputError(f"{path}: columns repeat: {', '.join(repeated)}; give each its own name")
     table = np.full((len(rows), len(header)), np.nan)
     for k, row in enumerate(rows):
         cells = row.split(",")
@@ -84,7 +87,7 @@ def _read(path: Path, lines: Any, unit: str | None) -> dict[str, KeypointRecordi
             positions, layout = counted_keypoints(path, points, said.get("layout"))
         else:
             positions, layout = named_keypoints(path, names, points)
-        fps = float(said["fps"]) if "fps" in said else None
+        fps = stated_rate(path, "fps", said["fps"]) if "fps" in said else None
         if fps is None and time is not None:
             fps, positions = evenly(path, table[:, time], positions)
         side = side or said.get("side", "").lower()

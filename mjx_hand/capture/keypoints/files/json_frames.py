@@ -14,7 +14,7 @@ from mjx_hand.capture.keypoints.files.reader import KeypointReader
 from mjx_hand.capture.keypoints.names import counted_keypoints, named_keypoints
 from mjx_hand.capture.keypoints.recording import KeypointRecording, check_keypoints
 from mjx_hand.capture.keypoints.size import unit_factor
-from mjx_hand.capture.keypoints.times import evenly
+from mjx_hand.capture.keypoints.times import evenly, stated_rate
 from mjx_hand.errors import InputError
 
 _TIMES = ("time", "timestamp", "t", "timestamp_ms", "time_ms")
@@ -41,7 +41,7 @@ def _read(path: Path, value: Any, unit: str | None) -> dict[str, KeypointRecordi
                 raise InputError(f"{path}: frame {k} has two hands called {hand.label!r}; keep one, or name them apart")
             course[k] = hand
     times = [next((frame[key] for key in _TIMES if key in frame), None) for frame in frames if isinstance(frame, dict)]
-    rate = next((float(said[key]) for key in _RATES if key in said), None)
+    rate = next((stated_rate(path, key, said[key]) for key in _RATES if said.get(key) is not None), None)
     found = {}
     for label, course in hands.items():
         positions, layout = _positions(path, course, said.get("layout"))
@@ -49,6 +49,8 @@ def _read(path: Path, value: Any, unit: str | None) -> dict[str, KeypointRecordi
         positions = positions * unit_factor(str(path), unit or said.get("unit") or first.unit or "m")
         fps = rate
         if fps is None and len(times) == len(frames) and None not in times:
+            if not all(isinstance(each, int | float) for each in times):
+                raise InputError(f"{path}: a frame's time is {times[0]!r}, expected a number of seconds")
             fps, positions = evenly(path, np.array(times, float), positions)
         side = first.side or (str(said.get("side", "")).lower() if len(hands) == 1 else "")
         source = path.name if len(hands) == 1 else f"{path.name} {label}"
