@@ -153,6 +153,8 @@ def _video(path: Path) -> FileFacts | None:
 
 
 def _unknown(path: Path) -> FileFacts:
+    if schema := schema_of(path):
+        raise InputError(f"{path}: schema {schema}, which this version of mjx-hand does not read; make it again")
     names = [f.name for f in (*dataset_formats(), *marker_formats())]
     names += ["joint motion", "robot motion", "demonstration", "MANO", "URDF", "MJCF"]
     short = dict.fromkeys(name.split(" (")[0] for name in names)

@@ -162,6 +162,8 @@ def test_what_is_not_known(tmp_path, capsys):
     assert "the file is empty" in refused(capsys, tmp_path / "empty.npz")
     np.savez(tmp_path / "stock.npz", prices=np.zeros(3))
     assert "nothing that is known here" in refused(capsys, tmp_path / "stock.npz")
+    np.savez(tmp_path / "old.npz", schema="mjx-hand/demonstration/0", angles=np.zeros(3))
+    assert "schema mjx-hand/demonstration/0, which this version" in refused(capsys, tmp_path / "old.npz")
     (tmp_path / "note.txt").write_text("hello")
     assert "nothing that is known here" in refused(capsys, tmp_path / "note.txt")
     (tmp_path / "cut.npz").write_bytes(b"PK\x03\x04nonsense")
