@@ -14,7 +14,7 @@ from mjx_hand.capture.load_markers import load_markers
 from mjx_hand.capture.marker_set import MarkerSet, load_marker_set
 from mjx_hand.capture.predicted_markers import predicted_markers
 from mjx_hand.capture.recording import MarkerRecording, hide_marker
-from mjx_hand.cli.output import print_table
+from mjx_hand.cli.output import check_out, print_table
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import HINGES
 from mjx_hand.hand.load import load_hand
@@ -57,6 +57,7 @@ def fit(
         fill: fill gaps of up to so many seconds; longer ones are left to the hand's other markers.
         mano: a licensed MANO file; without it, the open hand.
     """
+    check_out(out, recording, mano)
     if plot is not None:
         check_figure_path(plot)
     hand = load_hand(mano, side)

@@ -11,7 +11,7 @@ from mjx_hand.capture.keypoints.layouts import DIGITS
 from mjx_hand.capture.keypoints.load import load_keypoints
 from mjx_hand.capture.keypoints.report import KeypointReport
 from mjx_hand.capture.keypoints.side import known_side
-from mjx_hand.cli.output import print_table
+from mjx_hand.cli.output import check_out, print_table
 from mjx_hand.hand.joints import FINGERS
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion import Motion, save_motion
@@ -41,6 +41,7 @@ def keypoints(
         own_bones: keep the recorded joint centres and finger tips beside the shape.
         mano: a licensed MANO file to fit; without it, the open hand.
     """
+    check_out(out, recording, mano)
     found = load_keypoints(recording, side=side, sequence=sequence, fps=fps, unit=unit)
     which, how = known_side(found, side)
     settings = KeypointSettings(cutoff=cutoff, own_bones=own_bones)

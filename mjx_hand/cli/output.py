@@ -1,9 +1,13 @@
 """How commands speak: one console for people, and lengths and angles in the units people use."""
 
+from pathlib import Path
+
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
+
+from mjx_hand.errors import InputError
 
 
 def print_table(title: str, columns: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
@@ -22,3 +26,18 @@ def spread(values: np.ndarray, scale: float) -> tuple[str, str, str]:
     figures = (values.mean(), np.percentile(values, 95), values.max())
     mean, high, most = (f"{figure * scale:.2f}" for figure in figures)
     return mean, high, most
+
+
+def check_out(out: Path, *inputs: Path | None) -> None:
+    """Look at the path of an .npz that is to be written, before any work is done.
+
+    Raises:
+        InputError: it is not named so, is a folder, or is one of the inputs, which it would overwrite.
+    """
+    if out.is_dir():
+        raise InputError(f"{out}: is a folder; --out is the .npz file to write")
+    if out.suffix.lower() != ".npz":
+        raise InputError(f"{out}: --out is an .npz file; name it {out.with_suffix('.npz')}")
+    for path in inputs:
+        if path is not None and out.exists() and path.exists() and out.samefile(path):
+            raise InputError(f"{out}: is what is read; give another --out, so that the recording is kept")

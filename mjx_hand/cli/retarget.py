@@ -11,7 +11,7 @@ import tyro
 
 from mjx_hand.capture.datasets.dataset_format import dataset_formats
 from mjx_hand.capture.load import load_motion
-from mjx_hand.cli.output import print_table, spread
+from mjx_hand.cli.output import check_out, print_table, spread
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import LINKS, ONE_DOF, TWO_DOF
 from mjx_hand.motion import Motion, save_joint_motion
@@ -20,7 +20,7 @@ from mjx_hand.retarget.hands import KinematicHands
 from mjx_hand.retarget.options import RetargetOptions
 from mjx_hand.retarget.sequence import RetargetErrors, retarget_errors, retarget_many
 from mjx_hand.retarget.summary import DONE, OUTER_JOINTS, Outcome
-from mjx_hand.view.plots import joint_errors, save_figure
+from mjx_hand.view.plots import check_figure_path, joint_errors, save_figure
 from mjx_hand.view.progress import counter
 
 _SHOWN = 10  # failures that are listed one by one
@@ -71,6 +71,9 @@ def retarget(
             if value is not None:
                 raise InputError(f"{name} is for one recording, and {recording} is a folder of them; leave it out")
         return _folder(recording, out, options, axes, mano, side, fps, pattern or "*.npz")
+    check_out(out, recording, mano)
+    if plot is not None:
+        check_figure_path(plot)
     motion = load_motion(recording, side=side, sequence=sequence, mano=mano, fps=fps)
     rigid = KinematicHands(mano, axes).of(motion)
     began = time.perf_counter()
@@ -129,6 +132,10 @@ def _folder(
     fps: float | None,
     pattern: str,
 ) -> int:
+    if folder.is_file():
+        raise InputError(f"{folder}: is a file; --pattern chooses among a folder's files, so leave it out")
+    if out.is_file():
+        raise InputError(f"{out}: is a file, and {folder} is a folder of recordings; choose a folder for their outputs")
     started = time.perf_counter()
     with contextlib.ExitStack() as stack:
         bar: list[Callable[[int], None]] = []

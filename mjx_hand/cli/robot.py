@@ -10,7 +10,7 @@ from mjx_hand.capture.keypoints.load import is_keypoint_file, load_keypoints
 from mjx_hand.capture.keypoints.recording import KeypointRecording
 from mjx_hand.capture.keypoints.side import known_side
 from mjx_hand.capture.load import load_motion
-from mjx_hand.cli.output import print_table, spread
+from mjx_hand.cli.output import check_out, print_table, spread
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
 from mjx_hand.retarget.keypoints import retarget_keypoints
@@ -46,6 +46,7 @@ def robot(
         sequence: the name of one hand or recording in the file, where there are several.
         fps: frames a second, where the recording does not say.
     """
+    check_out(out, recording)
     description = load_robot(robot)
     tree, wanted = robot_objective(description, urdf, objective)
     found, which = _recorded(recording, side, sequence, fps)
@@ -78,7 +79,9 @@ def _recorded(path: Path, side: str | None, sequence: str | None, fps: float | N
     """The keypoints of a recording of any kind, and which hand it is."""
     if path.is_file() and is_keypoint_file(path):
         found = load_keypoints(path, side=side, sequence=sequence, fps=fps)
-        return found, known_side(found, side)[0]
+        if np.isfinite(found.positions[:, 0]).any():
+            return found, known_side(found, side)[0]
+    # Of any other kind, or without a wrist, as Leap Motion's: then the hand that is fitted to the keypoints has one.
     motion = load_motion(path, side=side, sequence=sequence, fps=fps)
     return motion_keypoints(motion, rigid_hand_of(motion, load_hand(side=motion.side))), motion.side
 

@@ -8,6 +8,7 @@ import tyro
 
 from mjx_hand.capture.keypoints.recording import save_keypoints
 from mjx_hand.capture.keypoints.video import track_video
+from mjx_hand.cli.output import check_out
 from mjx_hand.errors import InputError
 from mjx_hand.view.progress import counter
 
@@ -24,6 +25,7 @@ def track(
         out: the .npz to write: keypoints, which `mjx-hand keypoints` makes a motion of.
         side: which hand, where both are seen.
     """
+    check_out(out, video)
     with counter(None, f"{video.name}: frames") as advance:
         hands = track_video(video, lambda done, total: advance(1))
     seen = {name: float(np.isfinite(hand.positions).all(axis=(1, 2)).mean()) for name, hand in hands.items()}

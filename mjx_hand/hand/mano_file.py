@@ -89,7 +89,8 @@ _KEYS = ("v_template", "f", "weights", "J_regressor", "kintree_table", "shapedir
 
 def _values(path: Path) -> dict[str, Any]:
     if not path.is_file():
-        raise InputError(f"{path}: no such file; give a MANO .pkl or .npz, or leave it out to use the open hand")
+        what = "a folder" if path.is_dir() else "no such file"
+        raise InputError(f"{path}: {what}; give a MANO .pkl or .npz, or leave it out to use the open hand")
     if zipfile.is_zipfile(path):
         return dict(open_arrays(path))
     return inert_pickle.read(path.read_bytes(), str(path))

@@ -5,6 +5,7 @@ Only joints between the root and the links asked for are kept: the others cannot
 
 import contextlib
 import logging
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -51,7 +52,8 @@ def _read(path: Path) -> yourdfpy.Robot:
     if not path.is_file():
         raise InputError(f"{path}: {'a folder' if path.is_dir() else 'no such file'}; give the path of a URDF")
     try:
-        with _quiet("yourdfpy"):
+        ElementTree.parse(path)  # yourdfpy takes what it can of a file that is cut short
+        with _quiet("yourdfpy.urdf"):
             model = yourdfpy.URDF.load(str(path), build_scene_graph=False, load_meshes=False)
     except Exception as error:  # yourdfpy passes on whatever XML and number parsing raise
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
@@ -88,10 +90,13 @@ def _chain(path: Path, link: str, above: Mapping[str, Joint]) -> list[Joint]:
 def _check_joint(path: Path, joint: Joint) -> None:
     if joint.type not in ("fixed", *_MOVABLE):
         raise InputError(f"{path}: joint {joint.name!r} is of type {joint.type!r}; valid: fixed, {', '.join(_MOVABLE)}")
-    if joint.type in ("revolute", "prismatic") and (
-        joint.limit is None or joint.limit.lower is None or joint.limit.upper is None
-    ):
-        raise InputError(f"{path}: joint {joint.name!r} has no limits; add <limit lower=... upper=...>")
+    if joint.type in ("revolute", "prismatic"):
+        limit = joint.limit
+        if limit is None or limit.lower is None or limit.upper is None:
+            raise InputError(f"{path}: joint {joint.name!r} has no limits; add <limit lower=... upper=...>")
+        if not limit.lower <= limit.upper:
+            ends = f"from {limit.lower} to {limit.upper}"
+            raise InputError(f"{path}: joint {joint.name!r} has limits {ends}; give the lower one first")
     if joint.type != "fixed" and not (np.isfinite(joint.axis).all() and np.linalg.norm(joint.axis) > 1e-9):
         raise InputError(f"{path}: joint {joint.name!r} has axis {joint.axis}; give a direction")
 
@@ -131,6 +136,8 @@ def _tree(
     by_name = {joint.name: joint for joint in robot.joints}
     drives = [_drive(path, joint, by_name) for joint in movable]
     leaders = list(dict.fromkeys(drive.leader for drive in drives))
+    for name in leaders:
+        _check_joint(path, by_name[name])  # one may move none of the links itself
     index = {joint.name: k for k, joint in enumerate(movable)}
     frames = [z_frame(np.asarray(joint.axis)) for joint in movable]
 

@@ -108,7 +108,7 @@ def test_output_that_cannot_be_written_and_unknown_method(tmp_path, capsys):
     (tmp_path / "file").touch()
     for arguments, message in [
         (["--out", str(tmp_path / "file" / "x.npz")], "cannot write"),
-        (["--out", str(tmp_path)], "cannot write"),
+        (["--out", str(tmp_path)], "is a folder"),
         (["--out", str(tmp_path / "x.npz"), "--method", "guess"], "method 'guess'"),
     ]:
         assert main(["retarget", str(tmp_path / "motion.npz"), *arguments]) == 2
@@ -126,3 +126,28 @@ def test_installed_command_exits_with_2_and_says_one_line(tmp_path):
     )
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "mjx-hand: gone.npz: no such file; give the path of a recording\n"
+
+
+def test_output_that_would_replace_the_recording(tmp_path, capsys):
+    path = tmp_path / "motion.npz"
+    save_motion(made_motion(), path)
+    before = path.read_bytes()
+    assert main(["retarget", str(path), "--out", str(tmp_path / "." / "motion.npz")]) == 2
+    assert "is what is read; give another --out" in capsys.readouterr().err
+    assert path.read_bytes() == before
+
+
+def test_options_and_outputs_that_do_not_go_with_the_recording(tmp_path, capsys):
+    path, folder = tmp_path / "motion.npz", tmp_path / "folder"
+    folder.mkdir()
+    save_motion(made_motion(), path)
+    for recording, options, message in (
+        (path, ["--out", "a.npz", "--pattern", "*.npz"], "is a file; --pattern chooses"),
+        (path, ["--out", "a.txt"], "name it a.npz"),
+        (path, ["--out", "a.npz", "--plot", "a.bmp"], "figures are written as"),
+        (folder, ["--out", str(path)], "choose a folder for their outputs"),
+    ):
+        assert main(["retarget", str(recording), *options]) == 2
+        error = capsys.readouterr().err
+        assert message in error
+        assert error.count("\n") == 1

@@ -1,5 +1,7 @@
 """`mjx-hand robot`: recordings onto a robot hand, from the file to the file."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -20,6 +22,17 @@ def test_keypoints_become_the_robots_joints(recordings, tmp_path, capsys):
     assert motion.valid.all()
 
 
+def test_a_recording_without_a_wrist_gets_that_of_the_fitted_hand(recordings, tmp_path, capsys):
+    leap, out = recordings / "leap_motion/pinch.npz", tmp_path / "inspire.npz"
+    urdf = str(urdf_of("inspire"))
+    assert main(["robot", str(leap), "--urdf", urdf, "--robot", "inspire", "--out", str(out)]) == 0
+    assert "a right hand, 311 frames" in capsys.readouterr().out
+    motion = load_robot_motion(out)
+    assert np.ptp(motion.values[motion.valid], axis=0).max() > 0.2  # the fingers pinch
+    assert main(["info", str(out)]) == 0
+    assert "robot motion (mjx-hand/robot-motion/1)" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -27,9 +40,14 @@ def test_keypoints_become_the_robots_joints(recordings, tmp_path, capsys):
         ({"--urdf": "absent.urdf"}, "absent.urdf: no such file"),
         ({"--robot": "allegro"}, "has no link 'wrist'"),
         ({"recording": "absent.npz"}, "absent.npz: no such file"),
+        ({"--urdf": "cut.urdf"}, "cut.urdf: not a URDF that can be read (unclosed token"),
+        ({"--out": "o.txt"}, "name it o.npz"),
     ],
 )
-def test_bad_input_ends_in_one_line_and_status_2(changes, message, recordings, tmp_path, capsys):
+def test_bad_input_ends_in_one_line_and_status_2(changes, message, recordings, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    whole = urdf_of("inspire").read_text()
+    Path("cut.urdf").write_text(whole[: len(whole) // 2])
     options = {"--urdf": str(urdf_of("inspire")), "--robot": "inspire", "--out": str(tmp_path / "o.npz")}
     recording = changes.get("recording", str(recordings / "mediapipe_video/joints.npz"))
     options |= {name: value for name, value in changes.items() if name.startswith("--")}

@@ -107,6 +107,12 @@ def test_tied_joints_share_a_degree_of_freedom_and_its_limits(tmp_path):
         ({"one": "floating"}, ["b"], "'one' is of type 'floating'; valid: fixed, revolute"),
         ({"one": "ball"}, ["b"], "'one' is of type 'ball'"),
         ({"limit": ""}, ["b"], "'one' has no limits"),
+        (
+            {"limit": '<limit lower="1" upper="-1"/>'},
+            ["b"],
+            "'one' has limits from 1.0 to -1.0; give the lower one first",
+        ),
+        ({"limit": '<limit lower="-1" upper="nan"/>'}, ["b"], "'one' has limits from -1.0 to nan"),
         ({"mimic_one": '<mimic joint="two"/>', "mimic_two": '<mimic joint="one"/>'}, ["b"], "in a circle: one -> two"),
         ({"mimic_two": '<mimic joint="four"/>'}, ["b"], "mimics 'four', which is no movable joint"),
         ({"mimic_two": '<mimic joint="one" offset="9"/>'}, ["b"], "exclude each other"),
@@ -118,7 +124,7 @@ def test_urdfs_that_cannot_be_used_are_refused_in_one_line(tmp_path, changes, li
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("content", ["", "no xml", "<robot/>", "<mujoco/>"])
+@pytest.mark.parametrize("content", ["", "no xml", "<robot/>", "<mujoco/>", URDF[: len(URDF) // 2]])
 def test_files_that_are_no_urdf_are_refused_in_one_line(tmp_path, content):
     path = tmp_path / "robot.urdf"
     path.write_text(content)
