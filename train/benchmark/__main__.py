@@ -7,6 +7,7 @@ import tyro
 
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
+from mjx_hand.motion.archive import replacing
 from train.benchmark import engines, keypoints, retarget
 
 MODULES = {"engines": engines, "keypoints": keypoints, "retarget": retarget}
@@ -28,7 +29,11 @@ def main(argv: Sequence[str] | None = None) -> int:
             chosen = [make() for make in options.values()]
         for choice in chosen:
             (module,) = (m for m in MODULES.values() if type(choice) is m.Options)
-            print("\n".join(module.report(choice)) + "\n", flush=True)
+            text = "\n".join(module.report(choice)) + "\n"
+            print(text, flush=True)
+            if isinstance(choice, keypoints.Options | retarget.Options) and choice.out is not None:
+                with replacing(choice.out) as temporary:
+                    temporary.write_text(text)
     except InputError as error:
         print(f"benchmark: {error}", file=sys.stderr)
         return 2

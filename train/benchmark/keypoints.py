@@ -49,6 +49,7 @@ class Options:
         copies: how many copies of the recording the batched solver does side by side in its second row.
         runs: timed repetitions, of which the median is given.
         scipy_frames: frames that SciPy does.
+        out: Markdown file that the report is written to as well.
     """
 
     recording: Path | None = None
@@ -56,6 +57,7 @@ class Options:
     copies: int = 16
     runs: int = 5
     scipy_frames: int = 20
+    out: Path | None = None
 
 
 @dataclass(frozen=True)

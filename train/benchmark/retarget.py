@@ -51,12 +51,14 @@ class Options:
         runs: timed repetitions, of which the median is given.
         scipy_poses: poses that SciPy is timed on.
         recording: a MANO-layout recording to measure the accuracy on as well.
+        out: Markdown file that the report is written to as well.
     """
 
     poses: int = 1_000_000
     runs: int = 5
     scipy_poses: int = 20
     recording: Path | None = None
+    out: Path | None = None
 
 
 def report(options: Options) -> list[str]:

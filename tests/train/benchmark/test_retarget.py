@@ -18,9 +18,11 @@ def rows(text, heading):
     return {row[0]: row[1:] for row in cells[2:]}
 
 
-def test_report_has_the_exact_projection_equal_to_scipy_and_below_the_others(capsys, recordings):
-    assert main([*SMALL, "--recording", str(recordings / "dexmv_mustard" / "sequence.npz")]) == 0
+def test_report_has_the_exact_projection_equal_to_scipy_and_below_the_others(capsys, recordings, tmp_path):
+    recording, out = recordings / "dexmv_mustard" / "sequence.npz", tmp_path / "report.md"
+    assert main([*SMALL, "--recording", str(recording), "--out", str(out)]) == 0
     text = capsys.readouterr().out
+    assert text.endswith(out.read_text() + "\n")
     for heading in ("100 random anatomical poses", "dexmv_mustard/sequence.npz"):
         table = rows(text, heading)
         errors = {m: np.array([float(x) for x in row[0].split(" / ")]) for m, row in table.items() if row[0]}
