@@ -123,7 +123,9 @@ def fit_many(
     expected = Subject(shape=jnp.asarray(known), offsets=jnp.zeros((len(marker_set.names), 3)))
     starts = [begin(track, points, expected, palm, prior, MEAN_SHAPE_DEVIATION, OUTLIERS[0]) for track in tracks]
     chosen = [part(frames, state, key) for (frames, state), key in zip(starts, keys, strict=True)]
-    poses = solve_all(points, *joined(chosen), KEYFRAME_STEPS, meter).state
+    # Both solvers are compiled until the first subject is found, a minute when nothing is kept from before. All that is
+    # told as one piece of work: from the pace between the two, the time left would be put at half an hour.
+    poses = solve_all(points, *joined(chosen), KEYFRAME_STEPS, Meter(None, 0)).state
 
     place_deviation = jnp.asarray(marker_set.place_deviation, jnp.float32)
     shape_deviation = jnp.asarray(1.0 if settings.shape is None else KNOWN)
@@ -149,7 +151,7 @@ def fit_many(
         starts.append(
             (replace(frames, mean=habit), replace(state, vectors=between_keyframes(track.frames, key, vectors)))
         )
-        meter.add(len(key) * SUBJECT_STEPS)
+        meter.add(len(key) * (KEYFRAME_STEPS + SUBJECT_STEPS))
 
     frames, state = joined(starts)
     found = solve_all(points, frames, state, FRAME_STEPS, meter)

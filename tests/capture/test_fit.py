@@ -126,6 +126,8 @@ def test_progress_reaches_one(hand, marker_set, noisy):
     fit_many([noisy[0].recording], hand, marker_set, progress=shares.append)
     assert shares == sorted(shares)
     assert shares[-1] == pytest.approx(1)
+    # What holds the compilation is the first piece: key frames, 15 steps each, and the shape, 18 steps.
+    assert shares[0] == pytest.approx(48 * (15 + 18) / (48 * (15 + 18) + len(noisy[0].recording.positions) * 8))
 
 
 @pytest.mark.parametrize(
