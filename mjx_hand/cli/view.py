@@ -30,6 +30,7 @@ Up = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 def view(
     recording: Annotated[Path, tyro.conf.Positional],
     markers: Path | None = None,
+    units: str | None = None,
     side: Literal["right", "left"] | None = None,
     sequence: str | None = None,
     fps: float | None = None,
@@ -43,6 +44,7 @@ def view(
     Args:
         recording: a motion of any format that is read, hand keypoints, a joint motion, or a demonstration.
         markers: the marker recording that the motion was fitted to, to lay over it.
+        units: m, cm, mm or in, where the marker file's own unit is wrong or missing.
         side: which hand, where the file holds both or does not say.
         sequence: the name of one recording in the file, where there are several.
         fps: frames a second, where the file does not say.
@@ -51,9 +53,10 @@ def view(
         port: to serve at; 0 chooses a free one.
         host: address to listen on; 0.0.0.0 lets other computers look too.
     """
+    seen = load_markers(markers, units) if markers is not None else None
     scene = recording_scene(recording, side, sequence, fps, up, mano)
-    if markers is not None:
-        scene = with_markers(scene, load_markers(markers))
+    if seen is not None:
+        scene = with_markers(scene, seen)
     with serving(scene, port, host) as viewer:
         viewer.play()
         print(f"{recording}: open {viewer.url} in a browser; Ctrl-C here ends it", flush=True)
