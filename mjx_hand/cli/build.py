@@ -14,6 +14,10 @@ from mjx_hand.rigid.mesh_folder import filling
 from mjx_hand.rigid.mjcf import write_mjcf
 from mjx_hand.rigid.urdf import write_urdf
 
+MOST = (
+    10  # standard deviations of a shape coefficient; beyond, a slip of the keyboard would make a hand of ten kilograms
+)
+
 
 def build(
     out: Path,
@@ -44,6 +48,8 @@ def build(
     """
     if motion is not None and not report:
         raise InputError(f"--motion {motion} is measured by the report alone; give --report too")
+    if any(abs(value) > MOST for value in shape):
+        raise InputError(f"--shape {' '.join(f'{value:g}' for value in shape)}: no hand; stay within +-{MOST}")
     hand = load_hand(mano, side)
     rigid = build_rigid_hand(hand, np.array(shape))
     taken = []

@@ -77,6 +77,7 @@ def test_report_takes_a_recording(tmp_path, capsys, recordings):
     [
         (["--shape", "nan"], "every coefficient must be finite"),
         (["--shape", *["0"] * 40], "give a list of up to"),
+        (["--shape", "1", "-100"], "--shape 1 -100: no hand; stay within +-10"),
         (["--mano", "gone.pkl"], "gone.pkl"),
         (["--motion", "gone.npz"], "give --report too"),
         (["--report", "--motion", "gone.npz"], "gone.npz"),
