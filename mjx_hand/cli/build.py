@@ -14,9 +14,7 @@ from mjx_hand.rigid.mesh_folder import filling
 from mjx_hand.rigid.mjcf import write_mjcf
 from mjx_hand.rigid.urdf import write_urdf
 
-MOST = (
-    10  # standard deviations of a shape coefficient; beyond, a slip of the keyboard would make a hand of ten kilograms
-)
+MOST = 10  # standard deviations of a shape coefficient; a slip of the keyboard makes a thumb of nine kilograms
 
 
 def build(
