@@ -1,6 +1,7 @@
 """The command `mjx-hand`: one file a subcommand beside this one."""
 
 import importlib
+import os
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -39,4 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except InputError as error:
         print(f"mjx-hand: {error}", file=sys.stderr)
         return 2
+    except BrokenPipeError:  # whoever read the output has seen enough, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # Python flushes once more as it ends
+        return 1
     return status or 0

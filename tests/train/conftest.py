@@ -1,15 +1,23 @@
 """One tiny set of real demonstrations and one tiny training, made once a session: compiling them is what costs."""
 
+import dataclasses
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from filelock import FileLock
 
+import train.ppo
 from envs.demonstrations.dataset import SetSettings, make_set
+from envs.parallel import ParallelEnv
+from envs.rolling import make_roll_out
+from envs.tracking import TrackingEnv
 from train.config import Config
 from train.experiment import World, make_world
+from train.learner import Learner
 from train.options import Checks, Ppo
-from train.ppo import Point, train
+from train.ppo import Point
 
 TINY = Ppo(
     num_timesteps=64,
@@ -41,6 +49,29 @@ def tiny(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureReques
     return config
 
 
+@pytest.fixture(scope="session", autouse=True)
+def compiled_once() -> Iterator[None]:
+    """Trainings of one world share what is compiled: JAX keeps no compilation that calls the native engine."""
+    learners: dict[Any, Learner] = {}
+    rollers: dict[Any, Any] = {}
+
+    def learner(parallel: ParallelEnv, ppo: Ppo) -> Learner:
+        key = (id(parallel.env), parallel.guard, dataclasses.replace(ppo, num_timesteps=1))
+        if key not in learners:
+            learners[key] = Learner(parallel, ppo)  # which keeps the environment alive, and its id its own
+        return learners[key]
+
+    def roll_out(env: TrackingEnv, hands: Any, policy: Any) -> Any:
+        if id(env) not in rollers:
+            rollers[id(env)] = make_roll_out(env, hands, policy)
+        return rollers[id(env)]
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(train.ppo, "Learner", learner)
+        patched.setattr(train.ppo, "make_roll_out", roll_out)
+        yield
+
+
 @pytest.fixture(scope="session")
 def world(tiny: Config) -> World:
     return make_world(tiny, "train")
@@ -49,4 +80,4 @@ def world(tiny: Config) -> World:
 @pytest.fixture(scope="session")
 def trained(tiny: Config, world: World) -> tuple[Path, list[Point]]:
     """The folder of a finished training, and what it returned."""
-    return Path(tiny.out), train(tiny, world)
+    return Path(tiny.out), train.ppo.train(tiny, world)
