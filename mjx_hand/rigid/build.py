@@ -48,7 +48,7 @@ def build_rigid_hand(hand: HandModel, shape: ArrayLike | None = None, axes: str 
         raise InputError(f"shape {np.round(coefficients, 2).tolist()} turns the hand inside out; stay within +-5")
     scale = total / mass.sum()  # flat caps may overlap a little where three segments meet
 
-    surfaces = [segment.surface(divided, centre) for segment, centre in zip(parts.segments, centres, strict=True)]
+    surfaces = [segment.surface(divided, centres) for segment in parts.segments]
     owners = face_links(hand)
     samples = [skin_samples(rest, np.asarray(hand.faces)[owners == link]) for link in range(NUM_LINKS)]
     points, areas = [s[0] for s in samples], [s[1] for s in samples]

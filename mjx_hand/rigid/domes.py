@@ -102,16 +102,24 @@ def exits(
     volume = (a * normals[0]).sum(axis=-1)
     seen_from_inside = volume > 0
     faces, normals, volume = faces[seen_from_inside], normals[:, seen_from_inside], volume[seen_from_inside]
-    first, second, third = sides = ways @ np.swapaxes(normals, 1, 2)  # (3, r, f)
-    total = first + second + third
+    # Nearly all pairs of a ray and a triangle miss: single precision finds those that may not, fast.
+    rough = np.einsum("ri,sfi->srf", ways.astype(np.float32), normals.astype(np.float32))
+    least = np.minimum(np.minimum(rough[0], rough[1]), rough[2])
+    rows, columns = np.nonzero(least >= -1e-5 * np.abs(normals).max())
+    sides = np.einsum("ki,nki->kn", ways[rows], normals[:, columns])
+    total = sides.sum(axis=1)
     # A ray along an edge must not slip between its two triangles.
-    least = np.minimum(np.minimum(first, second), third)
-    inside = (least >= -1e-9 * total) & (total > 1e-12)
-    distance = np.where(inside, volume / np.where(inside, total, 1.0), np.inf)
-    nearest = distance.argmin(axis=1)
-    rows = np.arange(len(ways))
-    shares = (sides[:, rows, nearest] / total[rows, nearest]).T
-    return faces[nearest], shares, distance[rows, nearest]
+    hit = (sides.min(axis=1) >= -1e-9 * total) & (total > 1e-12)
+    rows, columns, sides, total = rows[hit], columns[hit], sides[hit], total[hit]
+    away = volume[columns] / total
+    nearest_first = np.lexsort((away, rows))
+    found, first = np.unique(rows[nearest_first], return_index=True)
+    best = nearest_first[first]
+    distance = np.full(len(ways), np.inf)
+    corners, shares = np.zeros((len(ways), 3), faces.dtype), np.zeros((len(ways), 3))
+    distance[found], corners[found] = away[best], faces[columns[best]]
+    shares[found] = sides[best] / total[best, None]
+    return corners, shares, distance
 
 
 def _rings(count: int) -> Int[np.ndarray, "f 3"]:

@@ -1,4 +1,4 @@
-"""The skin split into 16 patches along smooth curves, where one link's pull on it equals the next one's.
+"""The skin split into 16 patches along smooth curves, about where one link's pull on it equals the next one's.
 
 Whole triangles would leave a saw-tooth border, which shows as torn flaps when the hand closes. Triangles that a border
 crosses are therefore divided: every edge whose ends belong to different links gets one new vertex, and a triangle whose
@@ -9,20 +9,21 @@ import dataclasses
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.sparse import coo_array, csr_array, diags_array
+from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import LINKS, NUM_LINKS, PARENTS, TIP_LINKS
 from mjx_hand.hand.model import HandModel
+from mjx_hand.rigid.diffusion import diffused
+from mjx_hand.rigid.taut_borders import taut
 
-# Painted weights are rougher than borders should be: how far they are averaged (m), and the average's share. More of
-# either moves borders away from where rigid links follow the skin best.
-SMOOTHING, SMOOTHED = 0.0147, 0.6
+# How far (m) the links' patches are blurred into one another before the borders are drawn: teeth of this size go. More
+# of it moves borders away from where rigid links follow the skin best.
+BLUR = 0.010
 # How far skin may reach behind a phalanx's own joint, in bone lengths: none beyond the second figure. When the finger
 # flexes such skin (the thumb's web) would swing out at the back of the hand.
-BEHIND = (0.0, 0.2)
-MARGIN = 0.08  # a border keeps this share of an edge away from its ends, so that no triangle is a sliver
+BEHIND = (0.0, 0.05)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,28 +52,46 @@ def patches(hand: HandModel) -> Patches:
     """The skin of the hand, divided so that each link has one connected patch of it.
 
     Raises:
-        InputError: a link gets no skin, or the mesh is in several parts.
+        InputError: a link gets no skin, or the mesh is in several parts or has faces without area.
     """
+    if (hand.faces == np.roll(hand.faces, 1, axis=1)).any():
+        raise InputError(f"{hand.name}: some faces have a corner twice; give one surface of triangles")
     pull = link_pull(hand)
     labels = _connected(hand, pull)
-    return _divide(np.asarray(hand.faces), pull, labels)
+    return _divide(np.asarray(hand.template, dtype=float), np.asarray(hand.faces), pull, labels)
 
 
 def link_pull(hand: HandModel) -> Float[np.ndarray, "v 16"]:
-    """How strongly each link holds each vertex: its skinning weight, smoothed, and faded out behind its joint."""
-    average = _averaging(hand)
-    weights = np.asarray(hand.weights, dtype=float)
+    """How strongly each link holds each vertex, 0 to 1: the links' patches by skinning weight, blurred.
+
+    A border between blurred patches is a gentle curve however rough the painted weights are: one step of mean curvature
+    motion by diffusion (Merriman, Bence and Osher, "Motion of multiple junctions", J. Comput. Phys. 112, 1994).
+
+    Raises:
+        InputError: a link gets no skin, or the mesh is in several parts.
+    """
     template = np.asarray(hand.template, dtype=float)
-    edge = np.linalg.norm(template[hand.faces] - template[np.roll(hand.faces, 1, axis=1)], axis=-1).mean()
-    smooth = weights
-    for _ in range(round((SMOOTHING / edge) ** 2)):  # averaging spreads like diffusion: with the square root of rounds
-        smooth = average @ smooth
-    pull = SMOOTHED * smooth + (1 - SMOOTHED) * weights
+    weights = np.array(hand.weights, dtype=float)
     centres = np.asarray(hand.joint_regressor, dtype=float) @ template
     for link, bone in enumerate(bones(template, centres, np.asarray(hand.tip_vertices))[1:], start=1):
         behind = -(template - centres[link]) @ bone / (bone @ bone)
-        pull[:, link] *= np.clip((BEHIND[1] - behind) / (BEHIND[1] - BEHIND[0]), 0, 1)
-    return pull
+        weights[:, link] *= np.clip((BEHIND[1] - behind) / (BEHIND[1] - BEHIND[0]), 0, 1)
+    return diffused(np.eye(NUM_LINKS)[_connected(hand, weights)], template, np.asarray(hand.faces), BLUR)
+
+
+def _off_the_palm(labels: Int[np.ndarray, "v"], edges: Int[np.ndarray, "e 2"]) -> Int[np.ndarray, "v"]:
+    """Labels in which the palm's skin meets that of base phalanges only: what lies between joins the base phalanx.
+
+    Where the thumb's second phalanx reaches the palm, three patches end in a fringe that tears as the thumb bends.
+    """
+    labels = labels.copy()
+    both = np.concatenate([edges, edges[:, ::-1]])
+    inner = np.array([link > 0 and PARENTS[link] > 0 for link in range(NUM_LINKS)])
+    while True:
+        touching = np.unique(both[inner[labels[both[:, 0]]] & (labels[both[:, 1]] == 0), 0])
+        if not len(touching):
+            return labels
+        labels[touching] = np.array(PARENTS)[labels[touching]]
 
 
 def bones(
@@ -86,20 +105,15 @@ def bones(
     return ends - centres
 
 
-def _averaging(hand: HandModel) -> csr_array:
-    """Each vertex and its neighbours, averaged."""
-    count = hand.num_vertices
-    a, b = np.asarray(hand.faces)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).T
-    own = np.arange(count)
-    rows, columns = np.concatenate([a, b, own]), np.concatenate([b, a, own])
-    near = csr_array(coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count)))
-    near.data[:] = 1.0
-    return csr_array(diags_array(1 / near.sum(axis=1)) @ near)
+def _edges(faces: Int[np.ndarray, "f 3"]) -> Int[np.ndarray, "e 2"]:
+    """A mesh's edges, each once, the lower vertex first."""
+    return np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
 
 
 def _connected(hand: HandModel, pull: Float[np.ndarray, "v 16"]) -> Int[np.ndarray, "v"]:
-    """The link of each vertex: the strongest, except that islands join what surrounds them."""
-    a, b = np.unique(np.sort(np.asarray(hand.faces)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0).T
+    """The link of each vertex: the strongest, except at the palm's rim, and that islands join what surrounds them."""
+    edges = _edges(np.asarray(hand.faces))
+    a, b = edges.T
     labels = pull.argmax(axis=1)
     missing = [LINKS[link] for link in range(NUM_LINKS) if not (labels == link).any()]
     if missing:
@@ -107,6 +121,9 @@ def _connected(hand: HandModel, pull: Float[np.ndarray, "v 16"]) -> Int[np.ndarr
             f"{hand.name}: no skin follows {', '.join(missing)}; "
             "each link's weight must be the largest on some vertices"
         )
+    labels = _off_the_palm(labels, edges)
+    if len(np.unique(labels)) < NUM_LINKS:
+        raise InputError(f"{hand.name}: its faces join finger tips to the palm; give the surface of one hand")
     while True:
         same = labels[a] == labels[b]
         graph = coo_array((np.ones(same.sum()), (a[same], b[same])), shape=(len(labels), len(labels)))
@@ -126,17 +143,23 @@ def _connected(hand: HandModel, pull: Float[np.ndarray, "v 16"]) -> Int[np.ndarr
         labels[inside] = np.bincount(around).argmax()
 
 
-def _divide(faces: Int[np.ndarray, "f 3"], pull: Float[np.ndarray, "v 16"], labels: Int[np.ndarray, "v"]) -> Patches:
+def _divide(
+    template: Float[np.ndarray, "v 3"],
+    faces: Int[np.ndarray, "f 3"],
+    pull: Float[np.ndarray, "v 16"],
+    labels: Int[np.ndarray, "v"],
+) -> Patches:
     count = len(labels)
     corners = [np.tile(np.arange(count)[:, None], 3)]
     shares = [np.tile([1.0, 0.0, 0.0], (count, 1))]
 
-    # A vertex on every edge whose ends have different links, where the two pull alike.
-    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
-    a, b = edges[labels[edges[:, 0]] != labels[edges[:, 1]]].T
+    # A vertex on every edge whose ends have different links: about where the two pull alike, then drawn taut.
+    edges = _edges(faces)
+    crossed = edges[labels[edges[:, 0]] != labels[edges[:, 1]]]
+    a, b = crossed.T
     lead_a = np.maximum(pull[a, labels[a]] - pull[a, labels[b]], 1e-9)
     lead_b = np.maximum(pull[b, labels[b]] - pull[b, labels[a]], 1e-9)
-    along = np.clip(lead_a / (lead_a + lead_b), MARGIN, 1 - MARGIN)
+    along = taut(lead_a / (lead_a + lead_b), crossed, template, faces)
     corners.append(np.stack([a, b, b], axis=1))
     shares.append(np.stack([1 - along, along, 0 * along], axis=1))
     on_edge = {pair: count + k for k, pair in enumerate(zip(a.tolist(), b.tolist(), strict=True))}
