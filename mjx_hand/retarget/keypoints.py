@@ -94,7 +94,7 @@ def retarget_keypoints(
     valid = np.asarray(seen).reshape(*batch, frames)
     if not valid.any(axis=-1).all():
         raise InputError("keypoints: no frame of a recording shows enough of them to follow; give other frames")
-    posture, value = _solve(targets, frames, tree, objective, coarse, fine)
+    posture, value = _solve(targets, valid.ravel(), frames, tree, objective, coarse, fine)
     quaternion = np.asarray(matrix_to_quaternion(jnp.moveaxis(posture.rotation, -1, 0)))
     rows = (posture.values.T, posture.position.T, quaternion)
     dofs, position, turn = (np.asarray(r, float).reshape(*batch, frames, r.shape[-1]) for r in rows)
@@ -146,9 +146,15 @@ def _targets(
 
 
 def _solve(
-    targets: Targets, frames: int, tree: KinematicTree, objective: Objective, coarse: int, fine: int
+    targets: Targets,
+    seen: Bool[np.ndarray, "b"],
+    frames: int,
+    tree: KinematicTree,
+    objective: Objective,
+    coarse: int,
+    fine: int,
 ) -> tuple[Posture, Float[np.ndarray, "b"]]:
-    """All recordings, of `frames` frames each, from nothing."""
+    """All recordings, of `frames` frames each, from nothing. Frames in gaps hold none beside them."""
     targets = jax.tree.map(np.asarray, targets)
     count = targets.weights.shape[-1]
     few = np.unique([*range(0, frames, STRIDE), frames - 1])
@@ -159,7 +165,7 @@ def _solve(
     before, after, share = interpolation_index(few.astype(float), np.arange(frames, dtype=float))
     values = np.asarray(found.values).reshape(tree.num_dofs, -1, len(few))
     between = (1 - share) * values[..., before] + share * values[..., after]
-    linked = np.tile(np.arange(frames) > 0, count // frames).astype(np.float32)
+    linked = (np.tile(np.arange(frames) > 0, count // frames) & seen & np.roll(seen, 1)).astype(np.float32)
     return _in_chunks(between.reshape(tree.num_dofs, -1), targets, linked, tree, objective, fine, fine)
 
 

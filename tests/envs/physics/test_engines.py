@@ -162,7 +162,8 @@ def test_mjx_agrees_with_mujoco_in_the_air_and_in_a_grip(mjx_engine, mjx_roll, r
     demos, qpos, qvel, controls, pinching = rollout_inputs
     wanted = rolled(own_settings(mjx_engine))(demos, qpos, qvel, controls)
     found = mjx_roll(demos, qpos, qvel, controls)
-    assert_agrees(found, wanted, pinching, free=2e-5, touching={0.5: 2e-4, 1.0: 5e-3})
+    # Four worlds in contact, whose paths part from rounding on: how far differs from grasp to grasp.
+    assert_agrees(found, wanted, pinching, free=2e-5, touching={0.5: 1e-3, 1.0: 5e-3})
 
 
 def test_mjx_worlds_each_run_their_own_model(mjx_engine, mjx_roll, rollout_inputs):
