@@ -8,6 +8,8 @@ from mjx_hand.capture.recording import MarkerRecording
 from mjx_hand.errors import InputError
 from mjx_hand.pytree import replace
 
+FILL = 0.1  # s: gaps that are filled unless something else is said
+
 
 def fill_short_gaps(recording: MarkerRecording, seconds: float) -> MarkerRecording:
     """The recording with gaps of up to `seconds` filled by a cubic that does not overshoot (Fritsch and Carlson 1980).

@@ -4,7 +4,14 @@ from pathlib import Path
 
 from mjx_hand.capture.datasets.contents import WHOLE, read_contents
 from mjx_hand.capture.datasets.dataset_format import DatasetFormat, Request, dataset_formats
+from mjx_hand.capture.fit import fit_markers
+from mjx_hand.capture.gap_filling import FILL, fill_short_gaps
+from mjx_hand.capture.labels import match_labels
+from mjx_hand.capture.load_markers import load_markers
+from mjx_hand.capture.marker_set import load_marker_set
 from mjx_hand.errors import InputError
+from mjx_hand.hand.load import load_hand
+from mjx_hand.hand.model import HandModel
 from mjx_hand.motion import Motion
 
 _SHOWN = 6  # how many names of an unknown archive the message lists
@@ -18,8 +25,11 @@ def load_motion(
     sequence: str | None = None,
     mano: str | Path | None = None,
     fps: float | int | None = None,
+    markers: str | Path | None = None,
 ) -> Motion:
     """Read a motion; the format is recognised from the file itself (`mjx_hand/capture/datasets`, one module each).
+
+    A recording of optical markers is fitted first, as `mjx-hand fit` does, which also says how good the fit is.
 
     Args:
         path: a recording: a file, or a folder where a dataset's recording is one.
@@ -27,6 +37,7 @@ def load_motion(
         sequence: the name of one recording, where there are several.
         mano: a licensed MANO file of that side, where the poses need its components or mean.
         fps: frames a second, where the recording does not say.
+        markers: the marker set of a marker recording: a YAML file, or "hand22" or "glove13".
 
     Raises:
         InputError: there is no such file, no format recognises it, its contents are not sound, or it is not what was
@@ -35,6 +46,10 @@ def load_motion(
     path = Path(path)
     if side not in (None, "right", "left"):
         raise InputError(f"side is {side!r}; give 'right' or 'left'")
+    if markers is not None:
+        if sequence is not None or fps is not None:
+            raise InputError(f"{path}: marker files hold one recording and its rate; leave out sequence= and fps=")
+        return _fitted(path, markers, load_hand(mano, side or "right"))
     request = Request(
         side=side,
         sequence=sequence,
@@ -54,6 +69,13 @@ def load_motion(
     raise InputError(f"{path}: {_found(path, contents)}; formats read: {names} (docs/datasets.md says how)")
 
 
+def _fitted(path: Path, markers: str | Path, hand: HandModel) -> Motion:
+    """The motion of the hand that wears these markers."""
+    marker_set = load_marker_set(markers, hand)
+    recording = match_labels(load_markers(path), marker_set).recording
+    return fit_markers(fill_short_gaps(recording, FILL), hand, marker_set)[0]
+
+
 def _asked_for(path: Path, known: DatasetFormat, request: Request, motion: Motion) -> Motion:
     """`motion`, if nothing that the caller said is untrue of it."""
     if request.sequence is not None and not known.has_sequences:
@@ -69,7 +91,7 @@ def _found(path: Path, contents: dict) -> str:
     if path.is_dir():
         return "a folder of no layout that is known here"
     if path.suffix.lower() in _MARKER_FILES:
-        return "a marker recording, which needs a fit first"
+        return "a marker recording: name its marker set, markers='hand22' or a YAML file, or run mjx-hand fit"
     if "schema" in contents:
         return f"an .npz of schema {contents['schema']}, not a motion"
     if WHOLE in contents:

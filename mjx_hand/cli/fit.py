@@ -8,7 +8,7 @@ import tyro
 
 from mjx_hand.capture.fit import FitSettings, fit_many
 from mjx_hand.capture.fit_report import FitReport
-from mjx_hand.capture.gap_filling import fill_short_gaps
+from mjx_hand.capture.gap_filling import FILL, fill_short_gaps
 from mjx_hand.capture.labels import Labelled, match_labels
 from mjx_hand.capture.load_markers import load_markers
 from mjx_hand.capture.marker_set import MarkerSet, load_marker_set
@@ -39,7 +39,7 @@ def fit(
     leave_out: str | None = None,
     prefix: str = "",
     units: str | None = None,
-    fill: float = 0.1,
+    fill: float = FILL,
     mano: Path | None = None,
 ) -> None:
     """Fit a hand's pose, wrist, shape and skin offsets to optical markers.

@@ -66,7 +66,7 @@ def test_refusals_name_what_was_found_and_what_is_read(tmp_path):
         "": "a folder of no layout that is known here",
         "empty.npz": "the file is empty",
         "text.npz": "not a readable .npz file",
-        "marks.c3d": "a marker recording, which needs a fit first; formats read: ARCTIC",
+        "marks.c3d": "a marker recording: name its marker set, markers='hand22' or a YAML file, or run mjx-hand fit",
         "pose.pkl": "a lone NoneType without names",
         "other.npz": "an .npz of a0, a1, a2, a3, a4, a5 and more; formats read: ARCTIC",
         "pickled.npz": "an .npz of a; formats read",

@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from mjx_hand.capture.load import load_motion
 from mjx_hand.capture.load_markers import load_markers
 from mjx_hand.capture.marker_set import included_marker_set
 from mjx_hand.capture.recording import MarkerRecording, save_recording
 from mjx_hand.capture.simulate import simulate_markers
 from mjx_hand.cli.main import main
+from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion import load_motion_file
 from mjx_hand.pytree import replace
@@ -45,6 +47,10 @@ def test_a_c3d_file_becomes_a_motion(tmp_path, capsys, known):
     assert status == 0
     fit = load_motion_file(motion_file)
     assert errors(load_hand(), truth, fit).vertex.mean() < 0.002
+    read = load_motion(file, markers="hand22")
+    np.testing.assert_allclose(read.rotations, fit.rotations, atol=1e-5)
+    with pytest.raises(InputError, match="leave out sequence= and fps="):
+        load_motion(file, markers="hand22", fps=120)
     assert "fitting 300 frames: 100 in" in out
     assert "r.c3d: 300 frames at 120/s (2.5 s), 0 in gaps" in out
     assert "wrist_radial" in out
