@@ -127,9 +127,8 @@ class _Run:
         """Update, evaluate and save until all is done; the signal's number if one came before."""
         with (
             SummaryWriter(str(self.folder.path / "tensorboard"), write_to_disk=is_first()) as writer,
-            counter(self.last * self.learner.steps_per_update, "training (steps)") as advance,
+            counter(self.last * self.learner.steps_per_update, "training (steps)", self.steps) as advance,
         ):
-            advance(self.steps)
             logged = time.monotonic()
             if not self.points:
                 self._check(writer)

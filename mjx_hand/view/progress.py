@@ -25,8 +25,11 @@ def progress(items: Iterable[T], description: str, total: int | None = None) -> 
 
 
 @contextlib.contextmanager
-def counter(total: int | None, description: str) -> Iterator[Callable[[int], None]]:
-    """A context in which `advance(n)` says that n more of `total` are done; None where the total is not known."""
+def counter(total: int | None, description: str, done: int = 0) -> Iterator[Callable[[int], None]]:
+    """A context in which `advance(n)` says that n more of `total` are done; None where the total is not known.
+
+    `done` of them were done before, at no known pace.
+    """
     if sys.stdout.isatty():
         columns = (
             TextColumn("{task.description}"),
@@ -37,10 +40,10 @@ def counter(total: int | None, description: str) -> Iterator[Callable[[int], Non
             TimeRemainingColumn(),
         )
         with Progress(*columns, console=Console(file=sys.stdout)) as bar:
-            task = bar.add_task(description, total=total)
+            task = bar.add_task(description, total=total, completed=done)
             yield lambda count: bar.advance(task, count)
     else:
-        lines = _Lines(total, description)
+        lines = _Lines(total, description, done)
         yield lines.advance
         lines.write()
 
@@ -48,9 +51,9 @@ def counter(total: int | None, description: str) -> Iterator[Callable[[int], Non
 class _Lines:
     """Progress as lines of text, for logs: one after some seconds, one at the end."""
 
-    def __init__(self, total: int | None, description: str):
+    def __init__(self, total: int | None, description: str, done: int):
         self.total, self.description = total, description
-        self.done = 0
+        self.done = done
         self.start = self.written = time.monotonic()
         self.first: tuple[float, int] | None = None
 
