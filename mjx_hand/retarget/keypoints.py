@@ -32,7 +32,7 @@ from mjx_hand.rotations import matrix_to_quaternion
 
 CHUNK = 256  # frames solved in one call: its arrays stay in the processor's cache
 STRIDE = 8  # frames between those that are solved first
-COARSE, FINE = 20, 6  # iterations of those, and then of all frames
+COARSE, FINE = 40, 5  # iterations of those, and then of all frames
 REST_HOLD = 1e-8  # draws degrees of freedom that nothing else determines to the rest posture
 
 
