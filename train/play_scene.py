@@ -41,7 +41,7 @@ def rollout_scene(demonstration: Demonstration, rollouts: Rollouts, index: int, 
     achieved = rollouts.object_pose[index, frames]
     moved = transforms(quaternion_matrices(achieved[:, 3:]), achieved[:, :3])[:, None]
     layers = (
-        replace(twin_layer(done, hand, "twin"), opacity=1.0),
+        twin_layer(done, hand, "twin"),
         skin,
         replace(wanted, name="object", transforms=moved),
         _ghost(twin_layer(shown.motion, hand, "demonstration")),

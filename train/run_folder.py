@@ -55,7 +55,8 @@ class RunFolder:
         save_run(self._states, steps, state, notes)
 
     def _check_same(self, config: Config, written: Path) -> None:
-        before, now = (_settings(values) for values in (_read(written), json.loads(json.dumps(_as_dict(config)))))
+        plain = json.loads(json.dumps(dataclasses.asdict(config)))  # lists for tuples, as the file has them
+        before, now = _settings(_read(written)), _settings(plain)
         differing = [name for name in sorted(before.keys() | now.keys()) if before.get(name) != now.get(name)]
         if differing:
             name = differing[0]
@@ -64,10 +65,6 @@ class RunFolder:
                 f"{self.path} holds a training with {name}={before.get(name)}, now {now.get(name)}{others}; "
                 "choose another folder with out=FOLDER, or train anew in this one with fresh=true"
             )
-
-
-def _as_dict(config: Config) -> dict[str, Any]:
-    return dataclasses.asdict(config)
 
 
 def _read(path: Path) -> dict[str, Any]:
