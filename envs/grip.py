@@ -11,11 +11,11 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from envs.signed_distance import signed_distance
-from mjx_hand.hand.joints import TIP_LINKS
+from mjx_hand.hand.joints import FINGERS
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics
 
-_NEAR = 0.007  # m: a finger whose skin is closer than this is taken to touch
+_NEAR = 0.007  # m: a phalanx whose skin is closer than this is taken to touch
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
 _ALONG = np.linspace(0.0, 1.0, 5)
 
@@ -30,52 +30,56 @@ def grip_offsets(
     gains: Gains,
     planes: Float[Array, "h f 4"] | None = None,
 ) -> Float[Array, "t 20"]:
-    """Hinge offsets (rad) that put each touching finger's last link on the object's surface and press it there.
+    """Hinge offsets (rad) that put each touching phalanx on the object's surface and press it there.
 
-    Two parts: a damped least-squares step that closes the gap (or opens it, where capture error left the finger
-    inside), and dq = J^T f / kp for the force.
+    Two parts: a damped least-squares step that closes gaps (or opens them, where capture error left a finger inside),
+    and dq = J^T f / kp for the force.
 
-    The thumb presses with `force` newtons, the fingers that touch share as much between them; a hand whose thumb does
-    not touch presses with its fingers only, against the palm.
+    The thumb presses with `force` newtons, the fingers that touch share as much between them, and each spreads its
+    share over its phalanges that touch; a hand whose thumb does not touch presses with its fingers only, against the
+    palm.
 
     Args:
         angles: demonstrated hinge angles.
         object_in_hand: rotation and position (m) of the object in the wrist's frame.
-        rigid: the twin's hand; each finger's last capsule stands for its pad.
+        rigid: the twin's hand; its capsules stand for its skin.
         kind, size: the object's shape.
         force: newtons.
         gains: of the position controllers that the offsets are given to.
         planes: of a mesh (`envs.signed_distance.hull_planes`).
     """
-    pads = [max(k for k, link in enumerate(rigid.capsule_links) if link == tip) for tip in TIP_LINKS]
-    ends, radius = rigid.capsule_ends[jnp.array(pads)], rigid.capsule_radius[jnp.array(pads)]
-    thumb = jnp.arange(5) == 4
+    pads = jnp.array([k for k, link in enumerate(rigid.capsule_links) if link > 0])
+    links = np.array([link for link in rigid.capsule_links if link > 0])
+    of_finger = jnp.asarray((links[:, None] - 1) // 3 == np.arange(5), jnp.float32)  # (capsules, fingers)
+    thumb = jnp.arange(5) == FINGERS.index("thumb")
+    ends, radius = rigid.capsule_ends[pads], rigid.capsule_radius[pads]
     stiffness, limit = jnp.asarray(gains.stiffness), jnp.asarray(gains.force_limit)
+    rows = jnp.arange(len(links))
 
-    def pad_points(q: Array) -> Array:
+    def axis_points(q: Array) -> Array:
         rot, pos = forward_kinematics(q, rigid)
-        tips = jnp.array(TIP_LINKS)
-        near = pos[tips] + jnp.einsum("fij,fj->fi", rot[tips], ends[:, 0])
-        far = pos[tips] + jnp.einsum("fij,fj->fi", rot[tips], ends[:, 1])
+        near, far = (pos[links] + jnp.einsum("cij,cj->ci", rot[links], ends[:, k]) for k in (0, 1))
         return near[:, None] + _ALONG[None, :, None] * (far - near)[:, None]
 
     def one(q: Array, rotation: Array, position: Array) -> Array:
         def distance(point: Array) -> Array:
             return signed_distance(kind, size, rotation.T @ (point - position), planes)
 
-        points = pad_points(q)
-        gap = jax.vmap(jax.vmap(distance))(points) - radius[:, None]
-        closest = jnp.argmin(gap, axis=1)
-        rows = jnp.arange(5)
+        points = axis_points(q)
+        gaps = jax.vmap(jax.vmap(distance))(points) - radius[:, None]
+        closest = jnp.argmin(gaps, axis=1)
+        gap = gaps[rows, closest]
         inward = -jax.vmap(jax.grad(distance))(points[rows, closest])
-        touching = jax.nn.sigmoid((_NEAR - gap[rows, closest]) / 0.001)
-        fingers = jnp.sum(touching * ~thumb)
-        share = jnp.where(thumb, 1.0, 1.0 / jnp.maximum(fingers, 1.0)) * touching
-        jacobian = jax.jacfwd(pad_points)(q)[rows, closest]  # (5, 3, 20)
-        torque = jnp.einsum("fak,fa->k", jacobian, force * share[:, None] * inward)
-        rows_of_gap = jnp.einsum("fak,fa->fk", jacobian, inward) * touching[:, None]
-        square = rows_of_gap @ rows_of_gap.T + _DAMPING**2 * jnp.eye(5)
-        closing = rows_of_gap.T @ jnp.linalg.solve(square, gap[rows, closest] * touching)
+        touching = jax.nn.sigmoid((_NEAR - gap) / 0.001)
+        phalanges = touching @ of_finger  # how many of each finger touch
+        touches = jnp.minimum(phalanges, 1.0)
+        of_hand = jnp.where(thumb, touches, touches / jnp.maximum(jnp.sum(touches * ~thumb), 1.0))
+        share = touching * (of_finger @ (of_hand / jnp.maximum(phalanges, 1.0)))
+        jacobian = jax.jacfwd(axis_points)(q)[rows, closest]  # (capsules, 3, 20)
+        torque = jnp.einsum("cak,ca->k", jacobian, force * share[:, None] * inward)
+        rows_of_gap = jnp.einsum("cak,ca->ck", jacobian, inward) * touching[:, None]
+        square = rows_of_gap @ rows_of_gap.T + _DAMPING**2 * jnp.eye(len(links))
+        closing = rows_of_gap.T @ jnp.linalg.solve(square, gap * touching)
         return closing + jnp.clip(torque, -limit, limit) / stiffness
 
     return jax.lax.map(lambda row: one(*row), (angles, *object_in_hand), batch_size=64)

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from mujoco import batch
 from scipy.spatial.transform import Rotation
 
-from envs.physics.native import tuned
+from envs.physics.solver import gauss_seidel
 from envs.reference import Reference
 from envs.scene import NUM_WRIST, OBJECT
 from mjx_hand.hand.joints import NUM_HINGES
@@ -36,7 +36,7 @@ def assisted_replay(
     controls = np.clip(np.asarray(reference.controls, float), low, high)
     speed = _object_speed(pose, models[0].opt.timestep * substeps)
 
-    heavy = tuned([_with_heavy_object(model) for model in models])  # the friction that episodes will have
+    heavy = gauss_seidel([_with_heavy_object(model) for model in models])  # the friction that episodes will have
     worlds = batch.Batch(heavy[0], nsim=count)
     worlds.set_models(heavy)
     qpos = np.zeros((count, frames, models[0].nq))

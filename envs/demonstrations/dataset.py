@@ -28,7 +28,7 @@ from mjx_hand.rigid.rigid_hand import RigidHand
 
 PARTS = ("train", "heldout")
 YIELD = "yield.json"
-_VERSION = 2  # of the generator: a change that makes other demonstrations of the same settings raises it
+_VERSION = 3  # of the generator: a change that makes other demonstrations of the same settings raises it
 _SHAPE_LIMIT = 2.0  # standard deviations
 
 Report = Callable[[str, float], None]  # what is being done, and the share of it done

@@ -15,7 +15,7 @@ from envs.demonstrations.perform import OUTCOMES, Performance, perform
 from envs.demonstrations.posture import Posture, opened_angles, solve_postures, squeeze_angles
 from envs.demonstrations.script import GraspMotion, Tempo, scripted_targets
 from envs.grasps import GraspType
-from envs.physics.native import tuned
+from envs.physics.solver import gauss_seidel
 from envs.scene import TIMESTEP, scene_model, wrist_coordinates
 from envs.signed_distance import half_extents
 from mjx_hand.errors import InputError
@@ -123,7 +123,7 @@ def _attempt(
         models.append(scene_model(hands[k], things[k], *support_boxes(grasp), postures[k].rotation, gains=gains))
     bases = np.stack([postures[k].rotation for k in good])
     done = perform(
-        tuned(models),
+        gauss_seidel(models),
         bases,
         _controls(motions, bases, models[0]),
         np.stack(starts),

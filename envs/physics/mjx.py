@@ -10,7 +10,7 @@ from mujoco import mjx
 
 from envs.physics.engine import PhysicsState
 from envs.physics.family import make_family
-from envs.physics.native import tuned
+from envs.physics.solver import newton
 from envs.physics.recovery import recovered
 from mjx_hand.errors import InputError
 
@@ -21,7 +21,7 @@ def make(models: Sequence[mujoco.MjModel], substeps: int) -> "MjxEngine":
     Pyramidal cones with fewer iterations (impratio 3, 6 and 8) are four times as quick and another physics: the same
     replays from mid-grasp hold 11 of 64 objects, not 56. Elliptic ones with 6 and 8 throw them metres away.
     """
-    return MjxEngine(tuned(models), substeps)
+    return MjxEngine(newton(models), substeps)
 
 
 class MjxEngine:

@@ -5,7 +5,6 @@ function of what JAX holds: it survives scans, `where` and checkpoints without r
 callback.
 """
 
-import copy
 import os
 import threading
 from collections.abc import Sequence
@@ -19,6 +18,7 @@ from jaxtyping import Array, Float, Int
 from mujoco import batch
 
 from envs.physics.engine import PhysicsState
+from envs.physics.solver import gauss_seidel
 
 # Fields of the integration state that one step hands to the next; the control comes with each step.
 CARRIED = ("time", "qpos", "qvel", "act", "qacc_warmstart")
@@ -36,23 +36,7 @@ DIVERGED = [
 
 def make(models: Sequence[mujoco.MjModel], substeps: int) -> "NativeEngine":
     """The engine over copies of the models with its own solver settings."""
-    return NativeEngine(tuned(models), substeps)
-
-
-def tuned(models: Sequence[mujoco.MjModel]) -> list[mujoco.MjModel]:
-    """Copies with this engine's settings.
-
-    Newton stops early, so its caps are cheap; impratio 10 because at 1 no pinch holds. Elliptic cones: pyramidal ones
-    step half as fast again, and lose half of all pinches (19 of 40 held against 38 of 40, same scripts).
-    """
-    copies = [copy.copy(model) for model in models]
-    for model in copies:
-        model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
-        model.opt.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-        model.opt.impratio = 10.0
-        model.opt.iterations = 10
-        model.opt.ls_iterations = 20
-    return copies
+    return NativeEngine(gauss_seidel(models), substeps)
 
 
 def cores() -> int:

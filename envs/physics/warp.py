@@ -17,7 +17,7 @@ from mujoco.mjx.warp import types as warp_types
 
 from envs.physics.engine import PhysicsState
 from envs.physics.family import Family, leaf_names, make_family
-from envs.physics.native import tuned
+from envs.physics.solver import newton
 from envs.physics.recovery import recovered
 from mjx_hand.errors import InputError
 
@@ -30,7 +30,7 @@ _CAPSULE, _CYLINDER = mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLIN
 
 def make(models: Sequence[mujoco.MjModel], substeps: int) -> "WarpEngine":
     """The engine over copies of the models with the settings of MuJoCo's C engine, whose algorithms these are."""
-    return WarpEngine(tuned(models), substeps)
+    return WarpEngine(newton(models), substeps)
 
 
 class WarpEngine:

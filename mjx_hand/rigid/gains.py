@@ -30,6 +30,8 @@ class Gains:
         max_velocity: joint speed (rad/s) that the URDF states.
         wrist_slide: kp (N/m), kv (N s/m) of the wrist's three slides.
         wrist_turn: kp (N m/rad), kv (N m s/rad) of the wrist's three hinges.
+        wrist_armature: inertia (kg m^2) that the forearm adds to each of them; without it a heavy handle in the fist
+            buzzes at 4 ms steps.
     """
 
     stiffness: Float[np.ndarray, "20"] = dataclasses.field(
@@ -43,6 +45,7 @@ class Gains:
     max_velocity: float = 20.0
     wrist_slide: tuple[float, float] = (8000.0, 180.0)
     wrist_turn: tuple[float, float] = (150.0, 3.0)
+    wrist_armature: float = 0.005
 
     def __post_init__(self):
         for name in ("stiffness", "force_limit"):

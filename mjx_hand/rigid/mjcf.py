@@ -187,11 +187,11 @@ def _add_wrist_joints(spec: mujoco.MjSpec, wrist: mujoco.MjsBody, base: str, pre
         wrist.add_freejoint(name=f"{prefix}wrist")
     if base != "actuated":
         return
-    kinds = [(WRIST_SLIDES, mujoco.mjtJoint.mjJNT_SLIDE, gains.wrist_slide, WRIST_REACH)]
-    kinds += [(WRIST_TURNS, mujoco.mjtJoint.mjJNT_HINGE, gains.wrist_turn, np.pi)]
-    for names, kind, (kp, kv), reach in kinds:
+    kinds = [(WRIST_SLIDES, mujoco.mjtJoint.mjJNT_SLIDE, gains.wrist_slide, WRIST_REACH, 0.0)]
+    kinds += [(WRIST_TURNS, mujoco.mjtJoint.mjJNT_HINGE, gains.wrist_turn, np.pi, gains.wrist_armature)]
+    for names, kind, (kp, kv), reach, armature in kinds:
         for name, axis in zip(names, np.eye(3), strict=True):
-            wrist.add_joint(name=prefix + name, type=kind, axis=axis, range=[-reach, reach])
+            wrist.add_joint(name=prefix + name, type=kind, axis=axis, range=[-reach, reach], armature=armature)
             _add_actuator(spec, prefix + name, kp, kv)
 
 

@@ -10,7 +10,8 @@ import pytest
 from envs.physics import make_engine
 from envs.physics.engine import check_family, default_engine
 from envs.physics.mjx import MjxEngine
-from envs.physics.native import NativeEngine, tuned
+from envs.physics.native import NativeEngine
+from envs.physics.solver import newton
 from envs.scene import NUM_WRIST, demonstration_model
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
@@ -22,7 +23,7 @@ THING = slice(NUM_WRIST + NUM_HINGES, NUM_WRIST + NUM_HINGES + 3)
 
 @pytest.fixture(scope="module")
 def family(env):
-    return tuned(env.models)
+    return newton(env.models)
 
 
 @pytest.fixture(scope="module")
