@@ -10,8 +10,8 @@ from mujoco import mjx
 
 from envs.physics.engine import PhysicsState
 from envs.physics.family import make_family
-from envs.physics.solver import newton
 from envs.physics.recovery import recovered
+from envs.physics.solver import newton
 from mjx_hand.errors import InputError
 
 

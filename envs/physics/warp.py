@@ -17,8 +17,8 @@ from mujoco.mjx.warp import types as warp_types
 
 from envs.physics.engine import PhysicsState
 from envs.physics.family import Family, leaf_names, make_family
-from envs.physics.solver import newton
 from envs.physics.recovery import recovered
+from envs.physics.solver import newton
 from mjx_hand.errors import InputError
 
 # Else a line for each of a hundred kernels. Where Warp is not installed, its name means this module to type checkers.
