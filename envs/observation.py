@@ -13,12 +13,14 @@ from envs.reference import Reference
 from envs.scene import NUM_WRIST
 from envs.task import Task
 from mjx_hand.hand.joints import NUM_HINGES
+from mjx_hand.motion.demonstration import OBJECT_KINDS
 from mjx_hand.rotations import axis_angle_matrix, quaternion_difference, quaternion_to_matrix
 
 _NUM_TARGETS = NUM_WRIST + NUM_HINGES
 # One over what each target usually varies by: wrist slides 2 cm, wrist turns and hinges 0.2 rad.
 _TARGET_SCALE = np.concatenate([np.full(3, 50.0), np.full(3, 5.0), np.full(NUM_HINGES, 5.0)])
 _SPEED_SCALE = np.concatenate([np.full(3, 5.0), np.full(3, 0.5), np.full(NUM_HINGES, 0.2)])
+_FEATURE_SCALE = np.concatenate([[30.0, 30.0, 30.0, 5.0, 1.0], np.ones(len(OBJECT_KINDS))])
 _LENGTH_SCALE = 30.0  # 1/m for errors of the object, 3 cm
 _LIMIT = 5.0
 
@@ -76,7 +78,7 @@ def observe(
             ((targets[later] - now) * _TARGET_SCALE).ravel(),
             ((poses[later, :3] - pose[:3]) @ base * _LENGTH_SCALE).ravel(),
             jnp.array([2.0 * frame / reference.length[demonstration] - 1.0, (thing[2] - poses[0, 2]) * 10.0]),
-            reference.features[demonstration] * jnp.array([30.0, 30.0, 30.0, 5.0, 1.0]),
+            reference.features[demonstration] * _FEATURE_SCALE,
         ]
     )
     return jnp.clip(features, -_LIMIT, _LIMIT)

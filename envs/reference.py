@@ -8,11 +8,12 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 from scipy.spatial.transform import Rotation
 
+from envs.grasps import grasp_names, grasp_type
 from envs.grip import grip_offsets
 from envs.scene import NUM_WRIST, base_rotation, wrist_coordinates
 from envs.signed_distance import hull_planes
 from mjx_hand.errors import InputError
-from mjx_hand.motion.demonstration import Demonstration
+from mjx_hand.motion.demonstration import OBJECT_KINDS, Demonstration, ObjectDescription
 from mjx_hand.pytree import pytree
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand, stack_hands
@@ -28,7 +29,7 @@ class Reference:
         grip: the share of the controls that presses the fingers on the object.
         object_pose: in the world.
         base: world_from_base of each scene's wrist.
-        features: object size (m), mass (kg) and friction.
+        features: object size (m), mass (kg), friction, and 1 for its kind among `OBJECT_KINDS`.
         length: frames of each demonstration.
     """
 
@@ -37,7 +38,7 @@ class Reference:
     grip: Float[Array, "d t 26"]
     object_pose: Float[Array, "d t 7"]
     base: Float[Array, "d 3 3"]
-    features: Float[Array, "d 5"]
+    features: Float[Array, "d f"]
     length: Int[Array, "d"]
 
 
@@ -45,15 +46,22 @@ def make_reference(
     demonstrations: Sequence[Demonstration],
     hands: Sequence[RigidHand],
     *,
-    grip_force: float,
+    grip_force: float | None,
     gains: Gains,
 ) -> Reference:
-    """Stack demonstrations and work out their controls; a `grip_force` of 0 N replays them as they are.
+    """Stack demonstrations and work out their controls.
+
+    Args:
+        demonstrations: in any order; kinds of object and grasp types may be mixed.
+        hands: the twin's hand for each.
+        grip_force: of all (N); 0 replays them as they are, None takes that of each one's grasp type.
+        gains: of the hand's position controllers.
 
     Raises:
-        InputError: none given, several rates, or several kinds of object (one model family has one kind).
+        InputError: none given, several rates or sides, or no force for a demonstration whose grasp is no type.
     """
     _check(demonstrations)
+    forces = _grip_forces(demonstrations, grip_force)
     frames = max(d.num_frames for d in demonstrations)
     targets, poses, bases, relative = [], [], [], []
     for d in demonstrations:
@@ -66,26 +74,17 @@ def make_reference(
         thing = Rotation.from_quat(poses[-1][:, 3:], scalar_first=True)
         offset = poses[-1][:, :3] - _padded(d.motion.wrist_position, frames)
         relative.append(((hand.inv() * thing).as_matrix(), hand.inv().apply(offset)))
-    kind = demonstrations[0].object.kind
-    sizes = jnp.asarray(np.stack([d.object.size for d in demonstrations]), jnp.float32)
     targets = jnp.asarray(np.stack(targets), jnp.float32)
     rotation = jnp.asarray(np.stack([r for r, _ in relative]), jnp.float32)
     position = jnp.asarray(np.stack([p for _, p in relative]), jnp.float32)
-
-    @jax.jit
-    def grips(angles: Array, rotation: Array, position: Array, hands: RigidHand, sizes: Array, planes: Array) -> Array:
-        def one(a: Array, r: Array, p: Array, hand: RigidHand, size: Array, planes: Array) -> Array:
-            return grip_offsets(a, (r, p), hand, kind, size, grip_force, gains, planes if kind == "mesh" else None)
-
-        return jax.vmap(one)(angles, rotation, position, hands, sizes, planes)
-
-    if grip_force > 0:
-        planes = jnp.asarray(_stacked_planes([d.object.hulls for d in demonstrations]), jnp.float32)
-        grip = grips(targets[..., NUM_WRIST:], rotation, position, stack_hands(hands), sizes, planes)
-    else:
-        grip = jnp.zeros_like(targets[..., NUM_WRIST:])
-    grip = jnp.concatenate([jnp.zeros((*grip.shape[:2], NUM_WRIST)), grip], axis=-1)
-    features = [[*d.object.size, d.object.mass, d.object.friction] for d in demonstrations]
+    grip = jnp.zeros_like(targets)
+    for kind in OBJECT_KINDS:  # the shape is compiled in, so each kind's grips are worked out together
+        rows = np.array([k for k, d in enumerate(demonstrations) if d.object.kind == kind and forces[k] > 0], int)
+        if rows.size:
+            seen = (targets[rows, :, NUM_WRIST:], rotation[rows], position[rows])
+            chosen = [demonstrations[k].object for k in rows], [hands[k] for k in rows]
+            grip = grip.at[rows, :, NUM_WRIST:].set(_grips(kind, *seen, *chosen, forces[rows], gains))
+    features = [[*d.object.size, d.object.mass, d.object.friction, *_one_of_kinds(d)] for d in demonstrations]
     return Reference(
         targets=targets,
         controls=_anticipated(targets, gains, demonstrations[0].motion.fps) + grip,
@@ -95,6 +94,45 @@ def make_reference(
         features=jnp.asarray(features, jnp.float32),
         length=jnp.array([d.num_frames for d in demonstrations]),
     )
+
+
+def _grips(
+    kind: str,
+    angles: Float[Array, "n t 20"],
+    rotation: Float[Array, "n t 3 3"],
+    position: Float[Array, "n t 3"],
+    objects: Sequence[ObjectDescription],
+    hands: Sequence[RigidHand],
+    forces: Float[np.ndarray, "n"],
+    gains: Gains,
+) -> Float[Array, "n t 20"]:
+    """Grip offsets (rad) of demonstrations whose objects are of one kind; where each object is in the hand's frame."""
+
+    @jax.jit
+    @jax.vmap
+    def offsets(a: Array, r: Array, p: Array, hand: RigidHand, size: Array, planes: Array, force: Array) -> Array:
+        return grip_offsets(a, (r, p), hand, kind, size, force, gains, planes if kind == "mesh" else None)
+
+    sizes = jnp.asarray(np.stack([thing.size for thing in objects]), jnp.float32)
+    planes = jnp.asarray(_stacked_planes([thing.hulls for thing in objects]), jnp.float32)
+    return offsets(angles, rotation, position, stack_hands(hands), sizes, planes, jnp.asarray(forces, jnp.float32))
+
+
+def _grip_forces(demonstrations: Sequence[Demonstration], grip_force: float | None) -> Float[np.ndarray, "d"]:
+    """The force (N) of each demonstration's grip."""
+    if grip_force is not None:
+        return np.full(len(demonstrations), grip_force)
+    unknown = sorted({d.grasp for d in demonstrations} - set(grasp_names()))
+    if unknown:
+        raise InputError(
+            f"demonstrations of {unknown[0]!r} are of no grasp type ({', '.join(grasp_names())}) that says how hard to "
+            "press; give task.grip_force, in newtons"
+        )
+    return np.array([grasp_type(d.grasp).grip_force for d in demonstrations])
+
+
+def _one_of_kinds(demonstration: Demonstration) -> list[float]:
+    return [float(demonstration.object.kind == kind) for kind in OBJECT_KINDS]
 
 
 def _anticipated(targets: Float[Array, "d t 26"], gains: Gains, fps: float) -> Float[Array, "d t 26"]:
@@ -125,7 +163,6 @@ def _check(demonstrations: Sequence[Demonstration]) -> None:
         raise InputError("no demonstrations given; make a set with envs.demonstrations.dataset.make_set")
     for what, values in (
         ("frame rates", {round(d.motion.fps, 6) for d in demonstrations}),
-        ("kinds of object", {d.object.kind for d in demonstrations}),
         ("sides", {d.motion.side for d in demonstrations}),
     ):
         if len(values) > 1:

@@ -1,5 +1,7 @@
 """The twin's scene: the rigid hand on an actuated wrist, an object, boxes that hold it up, and a table."""
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 from jaxtyping import Float
@@ -13,14 +15,14 @@ from mjx_hand.rigid.mjcf import hand_spec
 from mjx_hand.rigid.rigid_hand import RigidHand
 
 TIMESTEP = 0.004  # s; 10 ms loses every grasp, 6.7 ms a third of them
-OBJECT, SUPPORT, TABLE = "object", "support", "table"
+OBJECT, SUPPORT, TABLE, SPARE = "object", "support", "table", "spare"
 # Of the hand with the object, and again of the object with the ground: the deepest contacts, the nearest pairs. A fist
 # around a handle has 13 of each, the other types fewer.
 MJX_CAPS = {"max_contact_points": 16, "max_geom_pairs": 16}
 NUM_WRIST = 6  # actuated wrist joints, before the hinges in qpos and ctrl
 
 # Who meets whom: (contype, conaffinity). The hand meets the object alone; the object also boxes and table.
-_HAND_MEETS, _OBJECT_MEETS, _GROUND_MEETS = (1, 0), (2, 1), (0, 2)
+_HAND_MEETS, _OBJECT_MEETS, _GROUND_MEETS, _SPARE_MEETS = (1, 0), (2, 1), (0, 2), (0, 0)
 _GEOM = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
     "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
@@ -38,6 +40,7 @@ def scene_model(
     *,
     gains: Gains | None = None,
     visual: bool = False,
+    spare: int = 0,
 ) -> mujoco.MjModel:
     """Compile the scene. qpos is the wrist's 3 slides (m) and 3 turns (rad), the 20 hinges, the object's free joint.
 
@@ -50,6 +53,7 @@ def scene_model(
             that they stay far from the Euler angles' singularity for a demonstration that starts near it.
         gains: of the hand's joints.
         visual: with the hand's meshes, for pictures; without them the model is small and quick.
+        spare: how many boxes to add that touch nothing.
     """
     if thing.kind not in OBJECT_KINDS:
         raise InputError(f"object kind {thing.kind!r} is not known; valid: {', '.join(OBJECT_KINDS)}")
@@ -66,6 +70,9 @@ def scene_model(
             geom.contype, geom.conaffinity = _HAND_MEETS
             _contact(geom, thing.friction, condim=4)  # torsion too: a pad is an area, not a point
     _add_ground(spec, support, support_position, thing.friction)
+    for k in range(spare):
+        box = spec.worldbody.add_geom(name=f"{SPARE}{k}", type=_GEOM["box"], size=[0.001] * 3, pos=[0.0, 0.0, -0.1])
+        box.contype, box.conaffinity = _SPARE_MEETS
     body = spec.worldbody.add_body(name=OBJECT)
     body.add_freejoint(name=OBJECT)
     for geom in _object_geoms(spec, body, thing):
@@ -122,7 +129,12 @@ def base_rotation(demonstration: Demonstration) -> Float[np.ndarray, "3 3"]:
 
 
 def demonstration_model(
-    demonstration: Demonstration, hand: RigidHand, *, gains: Gains | None = None, visual: bool = False
+    demonstration: Demonstration,
+    hand: RigidHand,
+    *,
+    gains: Gains | None = None,
+    visual: bool = False,
+    spare: int = 0,
 ) -> mujoco.MjModel:
     """The scene that a demonstration takes place in; arguments as of `scene_model`."""
     return scene_model(
@@ -133,7 +145,23 @@ def demonstration_model(
         base_rotation(demonstration),
         gains=gains,
         visual=visual,
+        spare=spare,
     )
+
+
+def demonstration_models(
+    demonstrations: Sequence[Demonstration], hands: Sequence[RigidHand], *, gains: Gains | None = None
+) -> list[mujoco.MjModel]:
+    """The scenes of demonstrations that run side by side, each on its own hand.
+
+    An engine's models have equally many geoms. Where objects or supports are of different numbers of pieces, scenes
+    with fewer get spare boxes, which touch nothing.
+    """
+    pieces = [len(d.support) + max(len(d.object.hulls), 1) for d in demonstrations]
+    return [
+        demonstration_model(d, hand, gains=gains, spare=max(pieces) - count)
+        for d, hand, count in zip(demonstrations, hands, pieces, strict=True)
+    ]
 
 
 def wrist_coordinates(

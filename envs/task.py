@@ -20,8 +20,8 @@ class Task:
         lost_at: a rollout ends when the object is this far from its reference.
         mid_start: share of training episodes that start in the middle of a demonstration, at a state from its own
             assisted replay (reference-state initialisation); the rest start at frame 0.
-        grip_force: force (N) with which the reference presses finger tips that touch; 0 leaves demonstrations as they
-            are.
+        grip_force: force (N) with which the reference presses fingers that touch; 0 leaves demonstrations as they are,
+            null takes that of each demonstration's grasp type.
         ahead: how many frames ahead the policy sees the reference.
     """
 
@@ -35,7 +35,7 @@ class Task:
     action_cost: float = 0.002
     lost_at: float = 0.08
     mid_start: float = 0.7
-    grip_force: float = 8.0
+    grip_force: float | None = None
     ahead: tuple[int, ...] = (1, 4, 12)
 
     def __post_init__(self):
@@ -49,9 +49,9 @@ class Task:
                 raise InputError(f"task.{name} is {getattr(self, name)}; it must lie between {low:g} and {high:g}")
         if self.smoothing == 1.0:
             raise InputError("task.smoothing is 1, which would ignore every action; give less, such as 0.9")
-        for name in ("action_cost", "grip_force"):
-            if not getattr(self, name) >= 0:
-                raise InputError(f"task.{name} is {getattr(self, name)}; it must not be negative")
+        for name, value in (("action_cost", self.action_cost), ("grip_force", self.grip_force or 0.0)):
+            if not value >= 0:
+                raise InputError(f"task.{name} is {value}; it must not be negative")
         if not self.ahead or any(k < 1 for k in self.ahead):
             raise InputError(
                 f"task.ahead is {self.ahead}; it must list frames ahead, each at least 1, such as [1,4,12]"

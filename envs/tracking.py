@@ -18,7 +18,7 @@ from envs.physics import make_engine
 from envs.physics.engine import PhysicsState
 from envs.reference import make_reference
 from envs.replay import assisted_replay
-from envs.scene import NUM_WRIST, demonstration_model
+from envs.scene import NUM_WRIST, demonstration_models
 from envs.task import Task
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
@@ -73,10 +73,7 @@ class TrackingEnv(Env):
         self.task = Task() if task is None else task
         gains = Gains() if gains is None else gains
         self.reference = make_reference(demonstrations, hands, grip_force=self.task.grip_force, gains=gains)
-        self.models = [
-            demonstration_model(demonstration, hand, gains=gains)
-            for demonstration, hand in zip(demonstrations, hands, strict=True)
-        ]
+        self.models = demonstration_models(demonstrations, hands, gains=gains)
         self.engine = make_engine(engine, self.models, self.task.substeps)
         self.dt = float(self.models[0].opt.timestep * self.task.substeps)
         self.fps = demonstrations[0].motion.fps

@@ -65,7 +65,9 @@ class SetSettings:
 
 def set_folder(settings: SetSettings, root: str | Path) -> Path:
     """Where a set of these settings lives below `root`: its name carries a digest of all settings and of the type."""
-    made_of = [_VERSION, dataclasses.asdict(settings), dataclasses.asdict(grasp_type(settings.grasp))]
+    grasp = dataclasses.asdict(grasp_type(settings.grasp))
+    del grasp["grip_force"]  # it is the twin's: the same demonstrations are made whatever it is
+    made_of = [_VERSION, dataclasses.asdict(settings), grasp]
     content = json.dumps(made_of, sort_keys=True)
     return Path(root) / f"{settings.grasp}-{hashlib.sha256(content.encode()).hexdigest()[:10]}"
 

@@ -90,6 +90,7 @@ class GraspType:
         approach: where the wrist comes from, relative to the grasp (world frame).
         closing: how the hand opens and presses.
         lift, carry, turn: ranges of height (m), sideways way (m) and rotation (rad).
+        grip_force: with which the reference of a twin presses (N), see `envs.grip`; demonstrations are made without.
     """
 
     name: str
@@ -105,6 +106,7 @@ class GraspType:
     lift: tuple[float, float]
     carry: tuple[float, float]
     turn: tuple[float, float]
+    grip_force: float
     object_rotation: Rows = UNTURNED
     support: tuple[Box, ...] = ()
     rest: float = 0.0

@@ -40,4 +40,5 @@ GRASP = GraspType(
     lift=(0.11, 0.15),
     carry=(0.06, 0.10),
     turn=(0.35, 0.52),
+    grip_force=1.0,  # more rolls the handle out of the hand
 )

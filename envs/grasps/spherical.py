@@ -45,4 +45,5 @@ GRASP = GraspType(
     lift=(0.11, 0.15),
     carry=(0.06, 0.10),
     turn=(0.35, 0.52),
+    grip_force=8.0,
 )

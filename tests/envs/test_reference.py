@@ -3,11 +3,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from envs.grasps import grasp_type
 from envs.reference import make_reference
 from envs.scene import NUM_WRIST, base_rotation, demonstration_model
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
-from mjx_hand.motion.demonstration import ObjectDescription
+from mjx_hand.motion.demonstration import OBJECT_KINDS, ObjectDescription
 from mjx_hand.pytree import replace
 from mjx_hand.rigid.gains import Gains
 
@@ -44,7 +45,8 @@ def test_the_bases_and_turns_make_up_the_wrists_orientation(demonstrations, refe
 
 def test_the_features_say_what_the_object_is(demonstrations, reference):
     for row, d in zip(np.asarray(reference.features), demonstrations, strict=True):
-        np.testing.assert_allclose(row, [*d.object.size, d.object.mass, d.object.friction], rtol=1e-6)
+        np.testing.assert_allclose(row[:5], [*d.object.size, d.object.mass, d.object.friction], rtol=1e-6)
+        assert [kind for kind, is_it in zip(OBJECT_KINDS, row[5:], strict=True) if is_it] == [d.object.kind]
 
 
 def tracked(model, controls, start):
@@ -91,14 +93,43 @@ def test_a_grip_is_part_of_the_controls(demonstrations, hands, reference, env):
     np.testing.assert_array_equal(np.asarray(reference.grip), 0.0)
 
 
+BALL = ObjectDescription(kind="sphere", size=np.array([0.0165, 0.0, 0.0]), mass=0.1, friction=1.0)
+
+
+def test_kinds_and_types_mix_and_each_is_as_if_it_were_alone(demonstrations, hands):
+    """Controls of a mixed set, in any order, are those of sets of one kind pressed with its own type's force."""
+    first, second = demonstrations
+    mixed = [
+        replace(second, object=BALL, grasp="lateral"),
+        first,
+        replace(first, object=BALL, grasp="spherical"),
+    ]
+    twins = [hands[1], hands[0], hands[0]]
+    together = make_reference(mixed, twins, grip_force=None, gains=Gains())
+    for k, (d, twin) in enumerate(zip(mixed, twins, strict=True)):
+        force = grasp_type(d.grasp).grip_force
+        alone = make_reference([d], [twin], grip_force=force, gains=Gains())
+        assert np.abs(alone.grip).max() > 0.05
+        for name in ("targets", "controls", "grip", "object_pose"):
+            rows = np.asarray(getattr(together, name)[k, : d.num_frames])
+            np.testing.assert_allclose(rows[:-1], getattr(alone, name)[0, : d.num_frames - 1], atol=1e-5, err_msg=name)
+        for name in ("base", "features", "length"):
+            np.testing.assert_array_equal(getattr(together, name)[k], getattr(alone, name)[0])
+
+
+def test_a_grasp_of_no_type_needs_to_be_told_its_force(demonstrations, hands):
+    wave = [replace(d, grasp="wave") for d in demonstrations]
+    with pytest.raises(InputError, match=r"'wave' are of no grasp type \(cylindrical, .*; give task.grip_force"):
+        make_reference(wave, hands, grip_force=None, gains=Gains())
+    told = make_reference(wave, hands, grip_force=3.0, gains=Gains())
+    assert np.abs(told.grip).max() > 0.05
+
+
 def test_demonstrations_that_do_not_belong_together_are_refused(demonstrations, hands):
     def made(second):
         make_reference([demonstrations[0], second], hands, grip_force=0.0, gains=Gains())
 
     d = demonstrations[1]
-    ball = ObjectDescription(kind="sphere", size=np.array([0.02, 0.0, 0.0]), mass=0.1, friction=1.0)
-    with pytest.raises(InputError, match=r"several kinds of object \(box, sphere\)"):
-        made(replace(d, object=ball))
     with pytest.raises(InputError, match=r"several frame rates \(25.0, 50.0\)"):
         made(replace(d, motion=replace(d.motion, fps=25.0)))
     with pytest.raises(InputError, match=r"several sides \(left, right\)"):
