@@ -21,8 +21,9 @@ OBJECT, SUPPORT, TABLE, SPARE = "object", "support", "table", "spare"
 MJX_CAPS = {"max_contact_points": 16, "max_geom_pairs": 16}
 NUM_WRIST = 6  # actuated wrist joints, before the hinges in qpos and ctrl
 
-# Who meets whom: (contype, conaffinity). The hand meets the object alone; the object also boxes and table.
-_HAND_MEETS, _OBJECT_MEETS, _GROUND_MEETS, _SPARE_MEETS = (1, 0), (2, 1), (0, 2), (0, 0)
+# Who meets whom: (contype, conaffinity). The hand meets the object alone; the object also boxes and table. Spare boxes
+# meet nobody; without a contype MuJoCo would leave them out of its trees, whose sizes must agree.
+_HAND_MEETS, _OBJECT_MEETS, _GROUND_MEETS, _SPARE_MEETS = (1, 0), (2, 1), (0, 2), (4, 0)
 _GEOM = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
     "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
@@ -154,13 +155,13 @@ def demonstration_models(
 ) -> list[mujoco.MjModel]:
     """The scenes of demonstrations that run side by side, each on its own hand.
 
-    An engine's models have equally many geoms. Where objects or supports are of different numbers of pieces, scenes
-    with fewer get spare boxes, which touch nothing.
+    An engine's models have equally many geoms: scenes whose supports have fewer boxes than others get spare ones, which
+    touch nothing.
     """
-    pieces = [len(d.support) + max(len(d.object.hulls), 1) for d in demonstrations]
+    most = max(len(d.support) for d in demonstrations)
     return [
-        demonstration_model(d, hand, gains=gains, spare=max(pieces) - count)
-        for d, hand, count in zip(demonstrations, hands, pieces, strict=True)
+        demonstration_model(d, hand, gains=gains, spare=most - len(d.support))
+        for d, hand in zip(demonstrations, hands, strict=True)
     ]
 
 

@@ -100,9 +100,10 @@ def check_family(models: Sequence[mujoco.MjModel]) -> None:
         raise InputError("an engine needs at least one model, got none")
     first = models[0]
     for i, model in enumerate(models):
-        for size in ("nq", "nv", "nu", "nbody", "ngeom", "nsite", "nsensordata", "npair"):
+        for size in ("nq", "nv", "nu", "nbody", "ngeom", "nsite", "nsensordata", "npair", "nC", "nbvh"):
             if getattr(model, size) != getattr(first, size):
                 raise InputError(
                     f"model {i} has {size} = {getattr(model, size)}, model 0 has {getattr(first, size)}; "
-                    "all models of a family must come from one scene with different parameters"
+                    "all models of a family must come from one scene with different parameters; its objects are of "
+                    "simple shapes, or all of one mesh"
                 )

@@ -42,7 +42,8 @@ def make_family(models: Sequence[mjx.Model]) -> Family:
         if structure != structures[0]:
             raise InputError(
                 f"model {i} differs from model 0 in structure (types of geoms or joints, or frames that coincide), "
-                "which MJX compiles in; build all models of a family from one scene with different parameters"
+                "which MJX compiles in; build all models of a family from one scene with different parameters, or run "
+                "several kinds of object or support on engine 'native'"
             )
     rows = [jax.tree_util.tree_leaves(m) for m in models]
     varying = {
