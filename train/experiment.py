@@ -24,10 +24,15 @@ class World:
 
 
 def make_world(config: Config, part: str) -> World:
-    """The environment over one part ("train", "heldout") of the experiment's demonstrations, made where missing."""
-    with shares() as report:
-        folder = make_set(config.data, config.demonstrations, report)
-    demonstrations = load_part(folder, part)
+    """The environment over one part ("train", "heldout") of the experiment's demonstrations, made where missing.
+
+    Of all grasp types together, they stand one type after the other.
+    """
+    demonstrations = []
+    for settings in config.data.of_each_type():
+        with shares() as report:
+            folder = make_set(settings, config.demonstrations, report)
+        demonstrations += load_part(folder, part)
     hands = twins(demonstrations)
     return World(demonstrations, hands, TrackingEnv(demonstrations, hands, config.engine, config.task))
 

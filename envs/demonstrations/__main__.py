@@ -68,9 +68,14 @@ def _make_writable(node: DictConfig) -> None:
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Make the set where it is missing, print its tables, write its picture."""
+    """Make the set where it is missing, print its tables, write its picture; `config=all` does so for each type."""
     settings, root = settings_of(arguments)
     enable_compile_cache()
+    for single in settings.of_each_type():
+        _make_and_show(single, root)
+
+
+def _make_and_show(settings: SetSettings, root: Path) -> None:
     with shares() as report:
         folder = make_set(settings, root, report)
     yields = json.loads((folder / YIELD).read_text())

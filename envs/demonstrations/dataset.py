@@ -18,7 +18,7 @@ import numpy as np
 
 from envs.demonstrations.record import CaptureSettings, record_trials, save_truth
 from envs.demonstrations.trials import perform_trials
-from envs.grasps import grasp_type
+from envs.grasps import grasp_names, grasp_type
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion.demonstration import Demonstration, load_demonstration, save_demonstration
@@ -27,6 +27,7 @@ from mjx_hand.rigid.build import build_rigid_hand
 from mjx_hand.rigid.rigid_hand import RigidHand
 
 PARTS = ("train", "heldout")
+ALL = "all"
 YIELD = "yield.json"
 _VERSION = 3  # of the generator: a change that makes other demonstrations of the same settings raises it
 _SHAPE_LIMIT = 2.0  # standard deviations
@@ -39,7 +40,7 @@ class SetSettings:
     """What a demonstration set holds.
 
     Attributes:
-        grasp: name of the grasp type.
+        grasp: name of the grasp type, or "all" for a set of each type.
         people: random hand shapes in the training part.
         heldout_people: others, in the held-out part.
         trials: demonstrations of each person.
@@ -55,12 +56,18 @@ class SetSettings:
     capture: CaptureSettings = dataclasses.field(default_factory=CaptureSettings)
 
     def __post_init__(self):
-        grasp_type(self.grasp)
+        if self.grasp != ALL:
+            grasp_type(self.grasp)
         for name in ("people", "heldout_people", "trials"):
             if getattr(self, name) < 1:
                 raise InputError(f"data.{name} is {getattr(self, name)}; it must be at least 1")
         if self.seed < 0:
             raise InputError(f"data.seed is {self.seed}; it must not be negative")
+
+    def of_each_type(self) -> tuple["SetSettings", ...]:
+        """The settings of the single sets that these stand for: one, or one of every grasp type."""
+        names = grasp_names() if self.grasp == ALL else [self.grasp]
+        return tuple(dataclasses.replace(self, grasp=name) for name in names)
 
 
 def set_folder(settings: SetSettings, root: str | Path) -> Path:
