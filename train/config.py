@@ -28,6 +28,7 @@ class Config:
         name: of the experiment.
         engine: auto, native, mjx or warp.
         seed: of networks, resets and actions.
+        seeds: for commands that take several seeds of one experiment; empty for `seed` alone.
         out: folder for checkpoints, logs and results.
         demonstrations: folder below which demonstration sets are kept, and made where missing.
         checkpoint: what to evaluate or play; empty for the best of `out`.
@@ -44,6 +45,7 @@ class Config:
     name: str = "pinch"
     engine: str = "auto"
     seed: int = 0
+    seeds: tuple[int, ...] = ()
     out: str = "outputs/${name}/seed${seed}"
     demonstrations: str = "outputs/demonstrations"
     checkpoint: str = ""
@@ -65,21 +67,63 @@ def compose(overrides: Sequence[str] = ()) -> Config:
     """The configuration that these command-line overrides give.
 
     Raises:
-        InputError: an unknown key, experiment or value, naming the valid ones.
+        InputError: an unknown key, experiment or value, naming the valid ones; or `seeds`.
     """
+    return to_config(_composed(overrides))
+
+
+def compose_seeds(overrides: Sequence[str] = ()) -> list[Config]:
+    """The configuration of each of `seeds`, as `of_seeds`.
+
+    Raises:
+        InputError: as `compose` and `of_seeds`.
+    """
+    return of_seeds(_composed(overrides))
+
+
+def _composed(overrides: Sequence[str]) -> DictConfig:
     _store_schema()
     try:
         with hydra.initialize_config_module("configs", version_base=None):
             base = hydra.compose("train", [o for o in overrides if o.startswith("config=")])
             for override in overrides:
                 _check_key(base, override.split("=", 1)[0].lstrip("+~"))
-            return to_config(hydra.compose("train", list(overrides)))
+            return hydra.compose("train", list(overrides))
     except (HydraException, OmegaConfBaseException) as error:
         raise InputError(_one_line(error)) from None
 
 
+def of_seeds(composed: DictConfig) -> list[Config]:
+    """A configuration for each of `seeds`, or for `seed` alone where they are empty; `out` follows the seed.
+
+    Raises:
+        InputError: a seed given twice, or an `out` or a `checkpoint` that is the same for several seeds.
+    """
+    seeds = list(composed.seeds or [composed.seed])
+    configs = []
+    for seed in seeds:
+        one = composed.copy()
+        one.seed, one.seeds = seed, []
+        configs.append(to_config(one))
+    if len(set(seeds)) < len(seeds):
+        raise InputError(f"seeds is {seeds}; give each seed once")
+    if len({config.out for config in configs}) < len(configs):
+        raise InputError(
+            f"out is {configs[0].out} for every seed; put ${{seed}} into it: out='{composed.out}/seed${{seed}}'"
+        )
+    if len(configs) > 1 and composed.checkpoint:
+        raise InputError("checkpoint=FILE is one seed's policy; leave out seeds=..., or checkpoint=... for their best")
+    return configs
+
+
 def to_config(composed: DictConfig) -> Config:
-    """The composed configuration as checked dataclasses."""
+    """The composed configuration as checked dataclasses.
+
+    Raises:
+        InputError: a value that cannot be used, or `seeds`, which are not one configuration.
+    """
+    if composed.seeds:
+        raise InputError(f"seeds is {list(composed.seeds)}, but this takes one seed; give it alone, such as seed=0")
     return _made(Config, OmegaConf.to_container(composed, resolve=True, throw_on_missing=True))
 
 
@@ -100,10 +144,18 @@ def command(task: Callable[[Config], object]) -> None:
 
     Input that cannot be used ends the process with one line and status 2.
     """
+    _command(lambda composed: task(to_config(composed)))
 
+
+def command_of_seeds(task: Callable[[Sequence[Config]], object]) -> None:
+    """Like `command`, for a task that takes the configurations of several seeds (`seeds=[0,1,2]`)."""
+    _command(lambda composed: task(of_seeds(composed)))
+
+
+def _command(task: Callable[[DictConfig], object]) -> None:
     def job(composed: DictConfig) -> None:
         try:
-            task(to_config(composed))
+            task(composed)
         except InputError as error:
             _refuse(error)
 
@@ -112,7 +164,7 @@ def command(task: Callable[[Config], object]) -> None:
     arguments = sys.argv[1:]
     if not any(argument.startswith("-") for argument in arguments):
         try:
-            compose(arguments)
+            of_seeds(_composed(arguments))
         except InputError as error:
             _refuse(error)
     hydra.main(version_base=None, config_path="pkg://configs", config_name="train")(job)()

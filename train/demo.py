@@ -14,9 +14,9 @@ from pathlib import Path
 
 import jax
 import numpy as np
+from matplotlib.figure import Figure
 
 from envs.demonstrations.dataset import set_folder
-from envs.metrics import position_error
 from envs.published import PAPER
 from mjx_hand.cli.retarget import retarget
 from mjx_hand.hand.joints import FINGERS, LINKS
@@ -25,14 +25,21 @@ from mjx_hand.motion import load_motion_file
 from mjx_hand.retarget.sequence import RetargetErrors, retarget_errors, retarget_sequence, rigid_hand_of
 from mjx_hand.view import plots
 from mjx_hand.view.progress import clock
-from mjx_hand.view.renderer import RendererUnavailable
-from mjx_hand.view.report import Headline, Plot, Report, write_report
+from mjx_hand.view.report import Film, Headline, Plot, Report, Section, write_report
 from train.benchmark.machine import processor
 from train.config import Config, command
-from train.evaluate import POLICY, REPLAY, ZERO, Results, evaluate_checkpoint, show, tables, write_results
+from train.evaluate import show
+from train.evaluation_page import TRACKING, tables, tracking_plot
+from train.evaluation_record import write_results
 from train.experiment import make_world
 from train.ppo import Point, train
-from train.video import side_by_side
+from train.seeds import POLICY, REPLAY, ZERO, Results, evaluate_seeds
+from train.video import film, median_and_worst
+
+_FILM = "Left the demonstration, right the twin: the held-out rollout of median tracking error."
+_LEARNING = "Share of training demonstrations tracked from frame 0, unassisted. The level is the untrained policy."
+_PROJECTION = "What 20 hinges cannot follow of one recording's 15 rotations, by the exact projection and the paper's."
+_TIPS = "Where that puts the finger tips, against the recording's own chain of rotations."
 
 
 def main(config: Config) -> None:
@@ -48,12 +55,14 @@ def main(config: Config) -> None:
     with _stage("training", timings):
         points = train(config, world)
     with _stage("evaluating on held-out demonstrations", timings):
-        results = evaluate_checkpoint(config)
-        write_results(results, config)
+        by_seed = evaluate_seeds([config])
+        write_results(by_seed, [config], {})
+        results = by_seed[config.seed]
     with _stage("video", timings):
-        video, missing = _video(results, out / "twin.mp4")
-    write_report(out / "report.html", _report(config, errors, points, results, video, missing, timings))
-    for table in tables(results, config):
+        _, median = median_and_worst({config.seed: results.evaluations[POLICY]})["median"]
+        video = film(results.world, results.rollouts[POLICY], median, out / "twin.mp4", _FILM)
+    write_report(out / "report.html", _report(config, errors, points, results, video, timings))
+    for table in tables(by_seed, config):
         show(table)
     print(f"\nreport: {(out / 'report.html').resolve()}  (open it in a browser)")
     print(f"all results: {out.resolve()}")
@@ -78,30 +87,19 @@ def _retarget(recording: Path, out: Path) -> dict[str, RetargetErrors]:
     }
 
 
-def _video(results: Results, path: Path) -> tuple[Path | None, str]:
-    """The held-out rollout of median tracking error, or why there is none."""
-    scores = results.evaluations[POLICY].scores["tracking_error_cm"]
-    median = int(np.argsort(scores)[len(scores) // 2])
-    try:
-        side_by_side(results.world, results.rollouts[POLICY], median, path)
-    except RendererUnavailable as error:
-        return None, str(error)
-    return path, ""
-
-
 def _report(
     config: Config,
     errors: dict[str, RetargetErrors],
     points: list[Point],
     results: Results,
-    video: Path | None,
-    missing: str,
+    video: Film,
     timings: list[tuple[str, float]],
 ) -> Report:
     rows = {title: evaluation.rows() for title, evaluation in results.evaluations.items()}
-    scores, failures = tables(results, config)
+    scores, failures = tables({config.seed: results}, config)
     paper = PAPER.get(config.data.grasp)
     joints = [name.replace("1", " base").replace("2", " middle").replace("3", " end") for name in LINKS[1:]]
+    rotations = {m: np.rad2deg(e.rotation[e.valid]) for m, e in errors.items()}
     exact = errors["exact"]
     tips = {finger: 1e3 * exact.tip_position[exact.valid, k] for k, finger in enumerate(FINGERS)}
     beside = f"paper: {100 * paper.success:.1f} %, success not defined" if paper else ""
@@ -124,34 +122,16 @@ def _report(
             ),
             Headline("training", clock(points[-1].seconds), f"{points[-1].steps:,} control steps"),
         ),
-        video=video,
-        video_missing=missing,
-        video_caption="Left the demonstration, right the twin: the held-out rollout of median tracking error.",
-        learning_curve=Plot(
-            plots.learning_curve(
-                np.array([p.steps for p in points]),
-                np.array([p.success for p in points]),
-                baseline=points[0].success if points[0].steps == 0 else None,
+        sections=(
+            Section("Demonstration and twin", [video]),
+            Section("Learning", [Plot(_learning_curve(points), _LEARNING)]),
+            Section("Tracking error over time", [Plot(tracking_plot({config.seed: results}), TRACKING)]),
+            Section("Success by every metric", [scores]),
+            Section("How failures failed", [failures]),
+            Section("From recorded rotations to hinges", [Plot(plots.joint_errors(joints, rotations), _PROJECTION)]),
+            Section(
+                "From recording to twin", [Plot(plots.retarget_errors(tips, label="finger-tip error (mm)"), _TIPS)]
             ),
-            "Share of training demonstrations tracked from frame 0, unassisted. The level is the untrained policy.",
-        ),
-        tracking=Plot(
-            plots.error_over_time(
-                results.world.env.fps,
-                {title: (100 * position_error(r), r.counted) for title, r in results.rollouts.items()},
-                limit=3.0,
-            ),
-            "Distance of the object from where the demonstration has it, on held-out demonstrations.",
-        ),
-        success=scores,
-        failures=failures,
-        projection=Plot(
-            plots.joint_errors(joints, {m: np.rad2deg(e.rotation[e.valid]) for m, e in errors.items()}),
-            "What 20 hinges cannot follow of one recording's 15 rotations, by the exact projection and the paper's.",
-        ),
-        retargeting=Plot(
-            plots.retarget_errors(tips, label="finger-tip error (mm)"),
-            "Where that puts the finger tips, against the recording's own chain of rotations.",
         ),
         how=[
             *((name, clock(seconds)) for name, seconds in timings),
@@ -161,6 +141,14 @@ def _report(
             ("versions", ", ".join(f"{name} {version(name)}" for name in ("mjx-hand", "mujoco", "jax", "brax"))),
         ],
         commands=[f"python -m train.demo config={config.name}", f"python -m train.evaluate config={config.name}"],
+    )
+
+
+def _learning_curve(points: list[Point]) -> Figure:
+    return plots.learning_curve(
+        np.array([p.steps for p in points]),
+        np.array([p.success for p in points]),
+        baseline=points[0].success if points[0].steps == 0 else None,
     )
 
 

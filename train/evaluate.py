@@ -1,96 +1,39 @@
-"""Evaluate a checkpoint on held-out demonstrations: `python -m train.evaluate config=pinch`.
+"""Evaluate checkpoints on held-out demonstrations: `python -m train.evaluate config=pinch seeds=[0,1,2]`.
 
-Every rollout counts, from frame 0, unassisted. Beside the policy stand two baselines without learning: the same
-reference with a residual of zero, and the demonstration replayed as it is. Writes `evaluation.json` and
-`evaluation.csv` (a row a rollout) to the experiment's `out` folder.
+Every rollout counts, from frame 0, unassisted. Beside the policies, the best of each seed, stand two baselines without
+learning: the same reference with a residual of zero, and the demonstration replayed as it is. Writes `evaluation.html`,
+`evaluation.json`, `evaluation.csv` (a row a rollout), `worst.mp4` and `median.mp4` to the seed's `out` folder, or to
+the one above those of several seeds.
 """
 
-import csv
-import dataclasses
-import json
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table as RichTable
 
-from envs.evaluation import Evaluation, evaluate
-from envs.published import PAPER
-from envs.rolling import make_roll_out, zero_residual
-from envs.rollout import Rollouts
-from envs.score_table import failure_table, score_table
-from mjx_hand.motion.archive import replacing
-from mjx_hand.view.report import Table
-from train.checkpoint import Checkpoint
-from train.config import Config, command
-from train.experiment import World, chosen_checkpoint, make_world, without_grip
-from train.policy import deterministic_policy
-
-HOLD = 5.0  # s after the demonstration, for the hold metric
-POLICY, ZERO, REPLAY = "policy", "zero residual", "demonstration alone"
+from mjx_hand.view.report import Table, write_report
+from train.config import Config, command_of_seeds
+from train.evaluation_page import evaluation_page, films, tables
+from train.evaluation_record import write_results
+from train.seeds import evaluate_seeds, shared_folder
 
 
-@dataclasses.dataclass(frozen=True)
-class Results:
-    """Rollouts and their scores, by column title."""
-
-    world: World
-    checkpoint: Checkpoint
-    rollouts: Mapping[str, Rollouts]
-    evaluations: Mapping[str, Evaluation]
-
-
-def evaluate_checkpoint(config: Config, part: str = "heldout") -> Results:
-    """Roll out policy and baselines on one part of the demonstrations and score them.
+def evaluate_and_write(configs: Sequence[Config]) -> tuple[Path, tuple[Table, Table]]:
+    """Evaluate one or several seeds of an experiment; the folder of all that was written, and the tables of scores.
 
     Raises:
-        InputError: no checkpoint, or one of another task.
+        InputError: as `evaluate_seeds`.
     """
-    world = make_world(config, part)
-    env = world.env
-    checkpoint = chosen_checkpoint(config, env.observation_size)
-    policy = deterministic_policy(config.ppo, env.observation_size, env.action_size)
-    alone = without_grip(world)
-    rollouts = {
-        POLICY: make_roll_out(env, world.hands, policy, HOLD)(checkpoint.policy),
-        ZERO: make_roll_out(env, world.hands, zero_residual, HOLD)(None),
-        REPLAY: make_roll_out(alone.env, world.hands, zero_residual, HOLD)(None),
+    results = evaluate_seeds(configs)
+    shown = films(results, shared_folder(configs))
+    notes = {
+        name: {"file": film.path.name if film.path else None, "caption": film.caption, "missing": film.missing}
+        for name, film in shown.items()
     }
-    objects = [demonstration.object for demonstration in world.demonstrations]
-    return Results(world, checkpoint, rollouts, {title: evaluate(r, objects) for title, r in rollouts.items()})
-
-
-def write_results(results: Results, config: Config) -> None:
-    """`evaluation.json` (means) and `evaluation.csv` (every rollout) in the experiment's folder."""
-    out = Path(config.out)
-    summary = {
-        "experiment": config.name,
-        "engine": results.world.env.engine.name,
-        "checkpoint_steps": results.checkpoint.steps,
-        "demonstrations": len(results.world.demonstrations),
-        "scores": {title: e.rows() for title, e in results.evaluations.items()},
-        "failures": {title: e.failure_shares() for title, e in results.evaluations.items()},
-    }
-    with replacing(out / "evaluation.json") as temporary:
-        temporary.write_text(json.dumps(summary, indent=1) + "\n")
-    with replacing(out / "evaluation.csv") as temporary, temporary.open("w", newline="") as file:
-        names = list(results.evaluations[POLICY].scores)
-        rows = csv.writer(file)
-        rows.writerow(["column", "demonstration", *names, "failure"])
-        for title, e in results.evaluations.items():
-            for k, demonstration in enumerate(e.demonstration):
-                rows.writerow([title, int(demonstration), *(f"{e.scores[n][k]:g}" for n in names), e.failure[k]])
-
-
-def tables(results: Results, config: Config) -> tuple[Table, Table]:
-    """Scores with the paper's row beside, and how rollouts failed."""
-    count = len(results.world.demonstrations)
-    note = (
-        f"{count} held-out demonstrations, every rollout counted, from frame 0, unassisted; "
-        "the paper does not define its success"
-    )
-    scores = score_table(results.evaluations, PAPER.get(config.data.grasp), note)
-    return scores, failure_table(results.evaluations)
+    out = write_results(results, configs, notes)
+    write_report(out / "evaluation.html", evaluation_page(results, configs, shown))
+    return out, tables(results, configs[0])
 
 
 def show(table: Table) -> None:
@@ -101,14 +44,13 @@ def show(table: Table) -> None:
     Console().print(made)
 
 
-def main(config: Config) -> None:
+def main(configs: Sequence[Config]) -> None:
     """Evaluate, print the tables, write the files."""
-    results = evaluate_checkpoint(config)
-    write_results(results, config)
-    for table in tables(results, config):
+    out, made = evaluate_and_write(configs)
+    for table in made:
         show(table)
-    print(f"written: {Path(config.out) / 'evaluation.json'} and evaluation.csv")
+    print(f"written: {(out / 'evaluation.html').resolve()}, evaluation.json and evaluation.csv")
 
 
 if __name__ == "__main__":
-    command(main)
+    command_of_seeds(main)

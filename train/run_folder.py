@@ -16,7 +16,18 @@ from train.processes import is_first, wait_for_all
 from train.saved_run import load_run, save_run
 
 # What may differ between a training and its continuation: places, and how long and how often.
-_FREE = ("out", "demonstrations", "checkpoint", "fresh", "distributed", "debug", "play", "checks", "ppo.num_timesteps")
+_FREE = (
+    "seeds",
+    "out",
+    "demonstrations",
+    "checkpoint",
+    "fresh",
+    "distributed",
+    "debug",
+    "play",
+    "checks",
+    "ppo.num_timesteps",
+)
 
 
 class RunFolder:

@@ -11,7 +11,7 @@ from PIL import Image
 from envs.scene import demonstration_model
 from mjx_hand.view.video import render_frames
 from train.config import compose
-from train.evaluate import POLICY, evaluate_checkpoint
+from train.seeds import POLICY, evaluate_checkpoint
 
 MOMENTS = (0.05, 0.33, 0.55, 0.75, 0.99)  # shares of the demonstration
 SIZE = (300, 300)

@@ -1,8 +1,9 @@
-"""`write_report`: everything about a training run on one HTML page that needs nothing but itself."""
+"""`write_report`: tables, figures and videos of trainings on one HTML page that needs nothing but itself."""
 
 import base64
 import dataclasses
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import jinja2
@@ -40,19 +41,37 @@ class Plot:
 
 
 @dataclasses.dataclass(frozen=True)
+class Film:
+    """A video and the sentence below it.
+
+    Attributes:
+        path: of an MP4 file, or None.
+        caption: what it shows.
+        missing: why there is no video; required where there is none.
+    """
+
+    path: Path | None
+    caption: str = ""
+    missing: str = ""
+
+
+@dataclasses.dataclass(frozen=True)
+class Section:
+    """Part of a page: what stands under one heading, from top to bottom; several figures stand in columns."""
+
+    title: str
+    parts: Sequence[Table | Plot | Film]
+
+
+@dataclasses.dataclass(frozen=True)
 class Report:
-    """What a report says; sections that are None are left out.
+    """What a report says.
 
     Attributes:
         title: of the page.
         task: what the twin is to do, in a sentence.
         headlines: the few numbers that matter most.
-        video: an MP4 file, or None.
-        video_missing: why there is no video; required where there is none.
-        video_caption: what the video shows.
-        learning_curve, tracking, projection, retargeting: figures of `plots`.
-        success: metrics, a row each, for policy, baseline and what was published.
-        failures: how failed rollouts failed.
+        sections: tables, figures and videos.
         how: (what, value) rows of how it was made: versions, hardware, seeds, timings.
         commands: commands that make it again.
     """
@@ -60,15 +79,7 @@ class Report:
     title: str
     task: str
     headlines: Sequence[Headline] = ()
-    video: Path | None = None
-    video_missing: str = ""
-    video_caption: str = ""
-    learning_curve: Plot | None = None
-    tracking: Plot | None = None
-    success: Table | None = None
-    failures: Table | None = None
-    projection: Plot | None = None
-    retargeting: Plot | None = None
+    sections: Sequence[Section] = ()
     how: Sequence[tuple[str, str]] = ()
     commands: Sequence[str] = ()
 
@@ -79,25 +90,37 @@ def write_report(path: str | Path, report: Report) -> None:
     Raises:
         InputError: neither a video nor a reason, a video file that is not there, or a table of uneven rows.
     """
-    if report.video is None and not report.video_missing:
-        raise InputError("the report has no video and no reason for it; give `video` or say why in `video_missing`")
-    if report.video is not None and not report.video.is_file():
-        raise InputError(f"{report.video}: no such video; render it first, or say why not in `video_missing`")
-    for table in filter(None, (report.success, report.failures)):
-        for row in table.rows:
-            if len(row) != len(table.columns):
-                raise InputError(f"table row {row[0]!r} has {len(row)} cells for {len(table.columns)} columns")
+    for part in (part for section in report.sections for part in section.parts):
+        _check(part)
     with replacing(path) as temporary:
         temporary.write_text(_html(report), encoding="utf-8")
+
+
+def _check(part: Table | Plot | Film) -> None:
+    if isinstance(part, Film):
+        if part.path is None and not part.missing:
+            raise InputError("the report has no video and no reason for it; give its `path` or say why in `missing`")
+        if part.path is not None and not part.path.is_file():
+            raise InputError(f"{part.path}: no such video; render it first, or say why not in `missing`")
+    if isinstance(part, Table):
+        for row in part.rows:
+            if len(row) != len(part.columns):
+                raise InputError(f"table row {row[0]!r} has {len(row)} cells for {len(part.columns)} columns")
 
 
 def _html(report: Report) -> str:
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
     template = environment.from_string(Path(__file__).with_name("report.html.j2").read_text(encoding="utf-8"))
-    plots = {
-        name: inline_svg(plot.figure, name)
-        for name in ("learning_curve", "tracking", "projection", "retargeting")
-        if (plot := getattr(report, name)) is not None
-    }
-    video = None if report.video is None else base64.b64encode(report.video.read_bytes()).decode("ascii")
-    return template.render(report=report, plots=plots, video=video)
+    names = itertools.count(1)
+    sections = [(section.title, [_shown(part, names) for part in section.parts]) for section in report.sections]
+    return template.render(report=report, sections=sections)
+
+
+def _shown(part: Table | Plot | Film, names: Iterator[int]) -> dict[str, object]:
+    """A part as the template takes it: its kind, its text, and its picture as the page holds it."""
+    if isinstance(part, Table):
+        return {"kind": "table", "table": part, "note": part.note}
+    if isinstance(part, Plot):
+        return {"kind": "plot", "svg": inline_svg(part.figure, f"plot{next(names)}"), "note": part.caption}
+    video = None if part.path is None else base64.b64encode(part.path.read_bytes()).decode("ascii")
+    return {"kind": "film", "video": video, "missing": part.missing, "note": part.caption}

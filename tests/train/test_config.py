@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mjx_hand.errors import InputError
-from train.config import Config, compose
+from train.config import Config, compose, compose_seeds
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 EXPERIMENTS = sorted(path.stem for path in (ROOT / "configs" / "config").glob("*.yaml"))
@@ -98,6 +98,38 @@ def test_an_unknown_key_is_told_the_valid_ones():
 def test_values_that_cannot_be_used_are_refused_by_name(override, said):
     text = refusal(override)
     assert all(part in text for part in said), text
+
+
+def test_every_seed_has_a_configuration_and_a_folder_of_its_own():
+    configs = compose_seeds(["config=lateral", "seeds=[2,0]", "data.people=3"])
+    assert [(c.seed, c.seeds, c.out) for c in configs] == [
+        (2, (), "outputs/lateral/seed2"),
+        (0, (), "outputs/lateral/seed0"),
+    ]
+    assert {c.data.people for c in configs} == {3}
+    assert compose_seeds(["seed=5"]) == [compose(["seed=5"])]
+    placed = compose_seeds(["seeds=[1,2]", "out=runs/${name}-${seed}"])
+    assert [c.out for c in placed] == ["runs/pinch-1", "runs/pinch-2"]
+
+
+@pytest.mark.parametrize(
+    ("overrides", "said"),
+    [
+        (("seeds=[1,1]",), "seeds is [1, 1]; give each seed once"),
+        (("seeds=[1,2]", "out=here"), "put ${seed} into it: out='here/seed${seed}'"),
+        (("seeds=[1,2]", "checkpoint=best.npz"), "checkpoint=FILE is one seed's policy"),
+        (("seeds=[1,a]",), "'a'"),
+    ],
+)
+def test_seeds_that_cannot_be_used_are_refused(overrides, said):
+    with pytest.raises(InputError) as caught:
+        compose_seeds(overrides)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_what_takes_one_seed_refuses_several():
+    assert "seeds is [1, 2], but this takes one seed" in refusal("seeds=[1,2]")
 
 
 def test_an_unknown_experiment_is_told_the_known_ones():

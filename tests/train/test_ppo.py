@@ -1,7 +1,6 @@
 import csv
 import dataclasses
 import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,14 +8,13 @@ import numpy as np
 import pytest
 from omegaconf import OmegaConf
 
-from envs.failure import FAILURES
 from mjx_hand.errors import InputError
 from train.checkpoint import load_checkpoint, save_checkpoint
 from train.config import Config, compose
-from train.evaluate import POLICY, REPLAY, ZERO, Results, evaluate_checkpoint, tables, write_results
 from train.experiment import World, chosen_checkpoint
 from train.options import Checks
 from train.ppo import Point, train
+from train.seeds import POLICY, ZERO, evaluate_checkpoint
 
 Trained = tuple[Path, list[Point]]
 
@@ -109,50 +107,6 @@ def test_a_folder_that_cannot_be_written_is_refused_before_any_work(tiny: Config
     with pytest.raises(InputError, match=r"cannot write .*file/out: .*; choose another folder with out=FOLDER"):
         train(nowhere)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
-
-
-@pytest.fixture(scope="module")
-def results(trained: Trained, tiny: Config) -> Results:
-    made = evaluate_checkpoint(tiny)
-    write_results(made, tiny)
-    return made
-
-
-def test_the_tables_have_the_policy_and_both_baselines(results: Results, tiny: Config):
-    scores, failures = tables(results, tiny)
-    assert list(scores.columns) == ["", POLICY, ZERO, REPLAY, "paper"]
-    assert list(failures.columns) == ["", POLICY, ZERO, REPLAY]
-    assert [row[0] for row in failures.rows] == list(FAILURES)
-    assert "1 held-out demonstrations" in scores.note
-    shown = {row[0]: row[1:4] for row in scores.rows}
-    means = [f"{results.evaluations[title].rows()['tracking_error_cm']:.2f} cm" for title in (POLICY, ZERO, REPLAY)]
-    assert list(shown["tracking error, mean over all rollouts"]) == means
-    assert any(title.startswith("still held") for title in shown), "rollouts go on after the demonstration"
-
-
-def test_the_two_files_agree_with_each_other_and_with_the_rollouts(results: Results, trained: Trained):
-    out, _ = trained
-    summary = json.loads((out / "evaluation.json").read_text())
-    assert (summary["experiment"], summary["engine"], summary["demonstrations"]) == ("tiny", "native", 1)
-    assert summary["checkpoint_steps"] == load_checkpoint(out / "best.npz").steps
-    written = rows(out / "evaluation.csv")
-    titles = (POLICY, ZERO, REPLAY)
-    assert [(row["column"], row["demonstration"]) for row in written] == [(title, "0") for title in titles]
-    for title, row in zip(titles, written, strict=True):
-        scores: Mapping[str, float] = summary["scores"][title]
-        assert list(row) == ["column", "demonstration", *scores, "failure"]
-        np.testing.assert_allclose([float(row[name]) for name in scores], list(scores.values()), rtol=1e-5)
-        assert (row["failure"] == "") == (float(row["manip_trans_object"]) == 1)
-        shares = summary["failures"][title]
-        assert {reason for reason, share in shares.items() if share} == ({row["failure"]} - {""})
-
-
-def test_baselines_do_not_depend_on_the_checkpoint_but_the_policy_does(results: Results):
-    errors = {title: e.scores["tracking_error_cm"][0] for title, e in results.evaluations.items()}
-    assert len(set(errors.values())) == 3
-    pressed, alone = (np.asarray(results.rollouts[title].qpos) for title in (ZERO, REPLAY))
-    np.testing.assert_array_equal(pressed[:, 0], alone[:, 0])
-    assert not np.array_equal(pressed, alone)
 
 
 def test_a_checkpoint_of_another_task_is_refused(trained: Trained, tiny: Config, world: World, tmp_path):

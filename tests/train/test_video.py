@@ -10,11 +10,8 @@ from envs.evaluation import Evaluation
 from envs.rollout import Rollouts
 from mjx_hand.view import video as view_video
 from mjx_hand.view.renderer import RendererUnavailable
-from train import demo
-from train.checkpoint import Checkpoint
-from train.evaluate import POLICY, Results
 from train.experiment import World
-from train.video import side_by_side
+from train.video import film, median_and_worst, side_by_side
 
 FRAMES = 9
 
@@ -44,13 +41,6 @@ def rollouts(world: World) -> Rollouts:
     )
 
 
-@pytest.fixture(scope="module")
-def results(world: World, rollouts: Rollouts) -> Results:
-    evaluation = Evaluation(np.arange(1), {"tracking_error_cm": np.array([1.0])}, ("",))
-    checkpoint = Checkpoint({}, {}, 0, 0.0, "tiny", 1)
-    return Results(world, checkpoint, {POLICY: rollouts}, {POLICY: evaluation})
-
-
 def frames_of(path: Path) -> tuple[float, np.ndarray]:
     """Frames a second, and every frame; decoded without imageio's reader, which forks a process that JAX runs in."""
     command = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
@@ -76,18 +66,36 @@ def test_demonstration_and_twin_stand_side_by_side(world: World, rollouts: Rollo
     assert np.abs(left - right).mean() < 3, "the reference stands beside itself"
 
 
-def test_the_demo_shows_the_rollout_of_median_error(results: Results, tmp_path):
-    path, missing = demo._video(results, tmp_path / "twin.mp4")
-    if path is None:
-        pytest.skip(missing)
-    assert (path, missing) == (tmp_path / "twin.mp4", "")
-    assert path.stat().st_size > 1000
+def scored(errors: list[float], failed: tuple[int, ...] = ()) -> Evaluation:
+    count = len(errors)
+    failure = tuple("rotated" if k in failed else "" for k in range(count))
+    return Evaluation(np.arange(count), {"tracking_error_cm": np.array(errors)}, failure)
 
 
-def test_the_demo_says_why_there_is_no_video(results: Results, tmp_path, monkeypatch):
+def test_the_median_and_the_worst_are_of_all_seeds():
+    chosen = median_and_worst({3: scored([1.0, 9.0]), 5: scored([2.0, 0.5, 4.0])})
+    assert chosen == {"median": (5, 0), "worst": (3, 1)}
+
+
+def test_a_failure_is_worse_than_a_success_with_a_larger_error():
+    chosen = median_and_worst({0: scored([1.0, 2.0, 1.5, 0.5], failed=(0, 2))})
+    assert chosen["worst"] == (0, 2)
+    assert chosen["median"] == (0, 2)  # of 0.5, 1, 1.5 and 2 the third
+
+
+def test_a_page_gets_a_film(world: World, rollouts: Rollouts, tmp_path):
+    made = film(world, rollouts, 0, tmp_path / "twin.mp4", "Left and right.")
+    if made.path is None:
+        pytest.skip(made.missing)
+    assert (made.path, made.caption, made.missing) == (tmp_path / "twin.mp4", "Left and right.", "")
+    assert made.path.stat().st_size > 1000
+
+
+def test_a_page_is_told_why_there_is_no_film(world: World, rollouts: Rollouts, tmp_path, monkeypatch):
     def without_graphics(*_: object, **__: object) -> None:
         raise RendererUnavailable("no OpenGL here; install libegl1")
 
     monkeypatch.setattr(view_video, "open_renderer", without_graphics)
-    assert demo._video(results, tmp_path / "twin.mp4") == (None, "no OpenGL here; install libegl1")
+    made = film(world, rollouts, 0, tmp_path / "twin.mp4", "")
+    assert (made.path, made.missing) == (None, "no OpenGL here; install libegl1")
     assert list(tmp_path.iterdir()) == []
