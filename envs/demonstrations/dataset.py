@@ -121,9 +121,9 @@ def _make_part(
     rng = np.random.default_rng(seed)
     shapes = np.clip(rng.normal(size=(people, model.num_shape)), -_SHAPE_LIMIT, _SHAPE_LIMIT)
     hands = [build_rigid_hand(model, shape) for shape in shapes]
-    wanted = people * settings.trials
+    wanted, what = people * settings.trials, f"{part} {grasp.name}"
     trials, tally = perform_trials(
-        grasp, hands, settings.trials, seed, lambda kept, tried: report(f"performing {part} grasps", kept / wanted)
+        grasp, hands, settings.trials, seed, lambda kept, tried: report(f"performing {what} grasps", kept / wanted)
     )
     recorded = record_trials(
         trials,
@@ -133,7 +133,7 @@ def _make_part(
         grasp,
         seed,
         settings.capture,
-        progress=lambda share: report(f"fitting {part} recordings", share),
+        progress=lambda share: report(f"fitting {what} recordings", share),
     )
     folder.mkdir()
     for k, (motion, demonstration, truth) in enumerate(recorded):
