@@ -18,6 +18,7 @@ from jaxtyping import Array, Float, Int
 from mujoco import batch
 
 from envs.physics.engine import PhysicsState
+from envs.physics.host_call import HostFunction
 from envs.physics.solver import gauss_seidel
 
 # Fields of the integration state that one step hands to the next; the control comes with each step.
@@ -61,25 +62,22 @@ class NativeEngine:
         ends = np.cumsum([sizes[field] for field in CARRIED])
         self._slices = {f: slice(e - sizes[f], e) for f, e in zip(CARRIED, ends, strict=True)}
         self._size = int(ends[-1])
-
-    def reset(
-        self, variant: Int[Array, ""], qpos: Float[Array, "nq"], qvel: Float[Array, "nv"], ctrl: Float[Array, "nu"]
-    ) -> PhysicsState:
-        return self._state(variant, self._call(self._host_reset, variant, qpos, qvel))
-
-    def step(self, state: PhysicsState, ctrl: Float[Array, "nu"]) -> PhysicsState:
-        return self._state(state.variant, self._call(self._host_step, state.variant, state.memory, ctrl))
-
-    def _call(self, host: Any, *args: Array) -> tuple[Array, ...]:
-        model = self.models[0]
-        shapes = (
+        self._shapes = (
             jax.ShapeDtypeStruct((2 * self._size,), jnp.uint32),
             jax.ShapeDtypeStruct((model.nq,), jnp.float32),
             jax.ShapeDtypeStruct((model.nv,), jnp.float32),
             jax.ShapeDtypeStruct((model.nsensordata,), jnp.float32),
             jax.ShapeDtypeStruct((), jnp.float32),
         )
-        return jax.pure_callback(host, shapes, *args, vmap_method="broadcast_all")
+        self._reset, self._step = HostFunction(self._host_reset), HostFunction(self._host_step)
+
+    def reset(
+        self, variant: Int[Array, ""], qpos: Float[Array, "nq"], qvel: Float[Array, "nv"], ctrl: Float[Array, "nu"]
+    ) -> PhysicsState:
+        return self._state(variant, self._reset(self._shapes, variant, qpos, qvel))
+
+    def step(self, state: PhysicsState, ctrl: Float[Array, "nu"]) -> PhysicsState:
+        return self._state(state.variant, self._step(self._shapes, state.variant, state.memory, ctrl))
 
     def _state(self, variant: Int[Array, ""], out: tuple[Array, ...]) -> PhysicsState:
         memory, qpos, qvel, sensordata, unstable = out
