@@ -19,7 +19,7 @@ from train.evaluation_record import write_results
 from train.seeds import evaluate_seeds, shared_folder
 
 
-def evaluate_and_write(configs: Sequence[Config]) -> tuple[Path, tuple[Table, Table]]:
+def evaluate_and_write(configs: Sequence[Config]) -> tuple[Path, tuple[Table, ...]]:
     """Evaluate one or several seeds of an experiment; the folder of all that was written, and the tables of scores.
 
     Raises:

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from envs.metrics import position_error
 from envs.published import PAPER
 from envs.score_table import demonstration_table, failed_table, failure_table, score_table
+from envs.type_table import type_table
 from mjx_hand.view import plots
 from mjx_hand.view.report import Film, Headline, Plot, Report, Section, Table
 from train.benchmark.machine import processor, versions
@@ -20,8 +21,11 @@ from train.video import film, median_and_worst
 TRACKING = "Distance of the object from where the demonstration has it, on held-out demonstrations."
 
 
-def tables(results: Mapping[int, Results], config: Config) -> tuple[Table, Table]:
-    """Scores with the paper's row beside, and how rollouts failed; of several seeds the mean."""
+def tables(results: Mapping[int, Results], config: Config) -> tuple[Table, ...]:
+    """Scores with the paper's row beside, and how rollouts failed; of several seeds the mean.
+
+    Where the demonstrations are of several grasp types, then also scores by type.
+    """
     first = next(iter(results.values()))
     count = len(first.world.demonstrations)
     note = (
@@ -30,7 +34,9 @@ def tables(results: Mapping[int, Results], config: Config) -> tuple[Table, Table
     )
     columns = {POLICY: [result.evaluations[POLICY] for result in results.values()]}
     columns |= {title: [first.evaluations[title]] for title in (ZERO, REPLAY)}
-    return score_table(columns, PAPER.get(config.data.grasp), note), failure_table(columns)
+    grasps = _grasps(first)
+    by_type = [type_table(columns, grasps)] if len(set(grasps)) > 1 else []
+    return score_table(columns, PAPER.get(config.data.grasp), note), failure_table(columns), *by_type
 
 
 def tracking_plot(results: Mapping[int, Results]) -> Figure:
@@ -65,7 +71,7 @@ def evaluation_page(results: Mapping[int, Results], configs: Sequence[Config], s
     config, first = configs[0], next(iter(results.values()))
     policies = {seed: result.evaluations[POLICY] for seed, result in results.items()}
     baselines = {title: first.evaluations[title] for title in (ZERO, REPLAY)}
-    scores, failures = tables(results, config)
+    scores, failures, *by_type = tables(results, config)
     objects = [demonstration.object for demonstration in first.world.demonstrations]
     success = [100 * e.rows()["manip_trans_object"] for e in policies.values()]
     errors = [e.rows()["tracking_error_cm"] for e in policies.values()]
@@ -75,8 +81,9 @@ def evaluation_page(results: Mapping[int, Results], configs: Sequence[Config], s
     return Report(
         title=f"{config.name}: evaluation",
         task=(
-            f"{len(objects)} held-out {config.data.grasp} demonstrations, by people and with objects that training has "
-            f"not seen, from the first frame to the last, unassisted; policies of {len(policies)} training seeds."
+            f"{len(objects)} held-out demonstrations ({', '.join(dict.fromkeys(_grasps(first)))}), by people and with "
+            "objects that training has not seen, from the first frame to the last, unassisted; policies of "
+            f"{len(policies)} training seeds."
         ),
         headlines=(
             Headline("success", f"{np.mean(success):.1f} %", _between(success, "%", 1)),
@@ -94,6 +101,7 @@ def evaluation_page(results: Mapping[int, Results], configs: Sequence[Config], s
         ),
         sections=(
             Section("Success by every metric", [scores]),
+            *([Section("Every grasp type", by_type)] if by_type else []),
             Section("Demonstration and twin", [shown["worst"], shown["median"]]),
             Section("Tracking error over time", [Plot(tracking_plot(results), TRACKING)]),
             Section("How failures failed", [failures]),
@@ -109,6 +117,10 @@ def evaluation_page(results: Mapping[int, Results], configs: Sequence[Config], s
         ],
         commands=[f"python -m train.evaluate config={config.name} seeds=[{seeds.replace(' ', '')}]"],
     )
+
+
+def _grasps(result: Results) -> list[str]:
+    return [demonstration.grasp for demonstration in result.world.demonstrations]
 
 
 def _between(values: Sequence[float], unit: str, digits: int) -> str:

@@ -13,6 +13,8 @@ import numpy as np
 
 from envs.demonstrations.dataset import set_folder
 from envs.evaluation import Evaluation
+from envs.grasps import grasp_names, grasp_type
+from envs.type_table import type_scores
 from mjx_hand.motion.archive import replacing
 from train.config import Config
 from train.seeds import POLICY, Results, shared_folder
@@ -31,6 +33,8 @@ def write_results(results: Mapping[int, Results], configs: Sequence[Config], fil
     out, config, first = shared_folder(configs), configs[0], next(iter(results.values()))
     policies = {seed: result.evaluations[POLICY] for seed, result in results.items()}
     baselines = {title: e for title, e in first.evaluations.items() if title != POLICY}
+    grasps = [demonstration.grasp for demonstration in first.world.demonstrations]
+    by_type = [type_scores(e, grasps) for e in policies.values()]
     summary = {
         "schema": SCHEMA,
         "experiment": config.name,
@@ -39,6 +43,10 @@ def write_results(results: Mapping[int, Results], configs: Sequence[Config], fil
         "checkpoint_steps": {seed: result.checkpoint.steps for seed, result in results.items()},
         "demonstrations": len(first.world.demonstrations),
         "scores": {POLICY: _mean([e.rows() for e in policies.values()]), **{t: e.rows() for t, e in baselines.items()}},
+        "types": {
+            POLICY: {grasp: _mean([scores[grasp] for scores in by_type]) for grasp in by_type[0]},
+            **{title: type_scores(e, grasps) for title, e in baselines.items()},
+        },
         "seeds": {seed: e.rows() for seed, e in policies.items()},
         "failures": {
             POLICY: _mean([e.failure_shares() for e in policies.values()]),
@@ -79,8 +87,10 @@ def made_of(configs: Sequence[Config]) -> str:
     content = hashlib.sha256(version("mjx-hand").encode())
     for config in configs:
         parts = [dataclasses.asdict(part) for part in (config.data, config.task, config.ppo, config.checks)]
-        folder = set_folder(config.data, config.demonstrations).name
-        content.update(json.dumps([config.name, config.engine, config.seed, folder, parts], sort_keys=True).encode())
+        sets = [set_folder(settings, config.demonstrations).name for settings in config.data.of_each_type()]
+        forces = [grasp_type(name).grip_force for name in grasp_names()]
+        told = [config.name, config.engine, config.seed, sets, forces, parts]
+        content.update(json.dumps(told, sort_keys=True).encode())
         policy = Path(config.checkpoint) if config.checkpoint else Path(config.out) / "best.npz"
         for path in (policy, Path(config.out) / "curve.csv"):
             content.update(path.read_bytes() if path.is_file() else b"none")
