@@ -18,9 +18,11 @@ from omegaconf.errors import OmegaConfBaseException
 from PIL import Image
 
 from envs.demonstrations.contact_sheet import contact_sheet
-from envs.demonstrations.dataset import PARTS, YIELD, SetSettings, load_part, make_set, twins
+from envs.demonstrations.contacts import check_contacts
+from envs.demonstrations.dataset import AS_RECORDED, PARTS, VARIED, YIELD, SetSettings, load_part, make_set, twins
 from envs.demonstrations.perform import OUTCOMES
 from envs.demonstrations.quality import check_part
+from envs.demonstrations.recorded import RECORDED
 from envs.demonstrations.trials import NO_POSTURE, SPARE
 from mjx_hand.cli.output import print_table
 from mjx_hand.compile_cache import enable_compile_cache
@@ -79,7 +81,8 @@ def _make_and_show(settings: SetSettings, root: Path) -> None:
     with shares() as report:
         folder = make_set(settings, root, report)
     yields = json.loads((folder / YIELD).read_text())
-    print_table(str(folder), ("", *PARTS), _yield_rows(yields) + _quality_rows(folder))
+    quality = _contact_rows(folder) if settings.grasp == RECORDED else _quality_rows(folder)
+    print_table(str(folder), ("", *PARTS), _yield_rows(yields) + quality)
     demonstrations = load_part(folder, PARTS[0])
     try:
         sheet = contact_sheet(demonstrations, twins(demonstrations))
@@ -92,7 +95,8 @@ def _make_and_show(settings: SetSettings, root: Path) -> None:
 
 
 def _yield_rows(yields: Mapping[str, Mapping[str, int]]) -> list[tuple[str, ...]]:
-    outcomes = [o for o in (*OUTCOMES, NO_POSTURE, SPARE) if any(o in tally for tally in yields.values())]
+    known = (*OUTCOMES, NO_POSTURE, SPARE, AS_RECORDED, VARIED)
+    outcomes = [o for o in known if any(o in tally for tally in yields.values())]
     attempts = ("attempts", *(str(sum(yields[part].values())) for part in PARTS))
     return [attempts, *((outcome, *(str(yields[part].get(outcome, 0)) for part in PARTS)) for outcome in outcomes)]
 
@@ -105,6 +109,17 @@ def _quality_rows(folder: Path) -> list[tuple[str, ...]]:
         ("hinges from the truth (°)", *(_range(np.rad2deg(q.angle_error)) for q in measured)),
         ("wrist from the truth (mm)", *(_range(1000 * q.wrist_error) for q in measured)),
         ("object from the truth, at most (mm)", *(_range(1000 * q.object_error) for q in measured)),
+    ]
+
+
+def _contact_rows(folder: Path) -> list[tuple[str, ...]]:
+    measured = [check_contacts(folder, part) for part in PARTS]
+    return [
+        ("length (s)", *(_range(c.seconds) for c in measured)),
+        ("lift (cm)", *(_range(100 * c.lift) for c in measured)),
+        ("mass (g)", *(_range(1000 * c.mass) for c in measured)),
+        ("finger tips off the lifted object, mean (mm)", *(_range(1000 * c.gap) for c in measured)),
+        ("hand in the object, at most (mm)", *(_range(1000 * c.depth) for c in measured)),
     ]
 
 

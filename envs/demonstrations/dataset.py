@@ -3,7 +3,7 @@
 A set is a folder of `train/NNN.npz` and `heldout/NNN.npz` (schema mjx-hand/demonstration/2). Beside each stand the
 motion that was fitted to its markers, `NNN.motion.npz` (which `mjx-hand retarget` reads), and its truth,
 `NNN.truth.npz`; `yield.json` counts what came of all attempts. Training and held-out demonstrations come from different
-people, object sizes and seeds.
+people, object sizes and seeds. A set made from a real recording holds variations of it, and neither motions nor truth.
 """
 
 import dataclasses
@@ -17,8 +17,11 @@ from pathlib import Path
 import numpy as np
 
 from envs.demonstrations.record import CaptureSettings, record_trials, save_truth
+from envs.demonstrations.recorded import RECORDED, read_demonstration
 from envs.demonstrations.trials import perform_trials
+from envs.demonstrations.variations import RecordingSettings, vary
 from envs.grasps import grasp_names, grasp_type
+from mjx_hand.capture.datasets.dexmv_object import recording_files
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion.demonstration import Demonstration, load_demonstration, save_demonstration
@@ -29,7 +32,10 @@ from mjx_hand.rigid.rigid_hand import RigidHand
 PARTS = ("train", "heldout")
 ALL = "all"
 YIELD = "yield.json"
+AS_RECORDED, VARIED = "as recorded", "varied"  # what a set from a recording counts
 _VERSION = 3  # of the generator: a change that makes other demonstrations of the same settings raises it
+_RECORDED_VERSION = 1  # the same of what is made of a recording
+_APART = 1_000_003  # between the seeds of the parts
 _SHAPE_LIMIT = 2.0  # standard deviations
 
 Report = Callable[[str, float], None]  # what is being done, and the share of it done
@@ -40,12 +46,13 @@ class SetSettings:
     """What a demonstration set holds.
 
     Attributes:
-        grasp: name of the grasp type, or "all" for a set of each type.
+        grasp: name of the grasp type, "all" for a set of each type, or "recorded" for what a real recording shows.
         people: random hand shapes in the training part.
         heldout_people: others, in the held-out part.
         trials: demonstrations of each person.
         seed: of every draw; the held-out part uses the next one.
         capture: how they are recorded.
+        recording: the real recording, and how it is varied; of the other settings it uses the seed.
     """
 
     grasp: str
@@ -54,10 +61,16 @@ class SetSettings:
     trials: int = 8
     seed: int = 0
     capture: CaptureSettings = dataclasses.field(default_factory=CaptureSettings)
+    recording: RecordingSettings = dataclasses.field(default_factory=RecordingSettings)
 
     def __post_init__(self):
-        if self.grasp != ALL:
+        if self.grasp not in (ALL, RECORDED):
             grasp_type(self.grasp)
+        if (self.grasp == RECORDED) != bool(self.recording.path):
+            raise InputError(
+                f"data.grasp is {self.grasp!r} and data.recording.path {self.recording.path!r}; "
+                f"give both, data.grasp={RECORDED} and the recording's folder, or a grasp type and no recording"
+            )
         for name in ("people", "heldout_people", "trials"):
             if getattr(self, name) < 1:
                 raise InputError(f"data.{name} is {getattr(self, name)}; it must be at least 1")
@@ -72,9 +85,20 @@ class SetSettings:
 
 def set_folder(settings: SetSettings, root: str | Path) -> Path:
     """Where a set of these settings lives below `root`: its name carries a digest of all settings and of the type."""
-    grasp = dataclasses.asdict(grasp_type(settings.grasp))
-    del grasp["grip_force"]  # it is the twin's: the same demonstrations are made whatever it is
-    made_of = [_VERSION, dataclasses.asdict(settings), grasp]
+    made_of = [_VERSION, dataclasses.asdict(settings)]
+    recording = made_of[1].pop("recording")
+    if settings.grasp == RECORDED:
+        files = _recording_files(settings.recording)
+        made_of = [
+            _RECORDED_VERSION,
+            settings.seed,
+            recording,
+            *(hashlib.sha256(f.read_bytes()).hexdigest() for f in files),
+        ]
+    else:
+        grasp = dataclasses.asdict(grasp_type(settings.grasp))
+        del grasp["grip_force"]  # it is the twin's: the same demonstrations are made whatever it is
+        made_of.append(grasp)
     content = json.dumps(made_of, sort_keys=True)
     return Path(root) / f"{settings.grasp}-{hashlib.sha256(content.encode()).hexdigest()[:10]}"
 
@@ -94,11 +118,14 @@ def make_set(settings: SetSettings, root: str | Path, report: Report = lambda wh
     except OSError as error:
         raise InputError(f"cannot write {folder}: {error.strerror}; choose another folder for demonstrations") from None
     try:
-        parts = dict(zip(PARTS, (settings.people, settings.heldout_people), strict=True))
-        yields = {
-            part: _make_part(settings, people, settings.seed + offset * 1_000_003, temporary / part, part, report)
-            for offset, (part, people) in enumerate(parts.items())
-        }
+        if settings.grasp == RECORDED:
+            yields = _make_variations(settings, temporary, report)
+        else:
+            parts = dict(zip(PARTS, (settings.people, settings.heldout_people), strict=True))
+            yields = {
+                part: _make_part(settings, people, settings.seed + offset * _APART, temporary / part, part, report)
+                for offset, (part, people) in enumerate(parts.items())
+            }
         (temporary / YIELD).write_text(json.dumps(yields, indent=1))
         (temporary / "settings.json").write_text(json.dumps(dataclasses.asdict(settings), indent=1))
         temporary.chmod(0o755)
@@ -143,6 +170,36 @@ def _make_part(
     return tally
 
 
+def _make_variations(settings: SetSettings, folder: Path, report: Report) -> Mapping[str, Mapping[str, int]]:
+    """Make both parts from a recording; what they hold."""
+    given, made = settings.recording, 0
+    report("reading the recording", 0.0)
+    recorded = read_demonstration(
+        given.path,
+        mass=given.mass,
+        friction=given.friction,
+        pieces=given.pieces,
+        rate=given.rate,
+        cutoff=given.cutoff,
+    )
+    for offset, (part, count) in enumerate(zip(PARTS, (given.train, given.heldout), strict=True)):
+        rng = np.random.default_rng(settings.seed + offset * _APART)
+        (folder / part).mkdir()
+        for k in range(count):
+            demonstration = recorded if (part, k) == (PARTS[1], 0) else vary(recorded, given, rng)
+            save_demonstration(demonstration, folder / part / f"{k:03d}.npz")
+            made += 1
+            report("varying the recording", made / (given.train + given.heldout))
+    return {PARTS[0]: {VARIED: given.train}, PARTS[1]: {AS_RECORDED: 1, VARIED: given.heldout - 1}}
+
+
+def _recording_files(settings: RecordingSettings) -> tuple[Path, Path]:
+    try:
+        return recording_files(settings.path)
+    except InputError as error:
+        raise InputError(f"{error}: data.recording.path=FOLDER") from None
+
+
 def load_part(folder: str | Path, part: str) -> list[Demonstration]:
     """The demonstrations of one part of a set, in order.
 
@@ -160,4 +217,6 @@ def load_part(folder: str | Path, part: str) -> list[Demonstration]:
 def twins(demonstrations: Sequence[Demonstration]) -> list[RigidHand]:
     """The twin's hand for each demonstration, from the shape that was fitted to the person."""
     model = load_hand(side=demonstrations[0].motion.side)
-    return [build_rigid_hand(model, demonstration.shape) for demonstration in demonstrations]
+    made = {d.shape.tobytes(): d.shape for d in demonstrations}
+    hands = {key: build_rigid_hand(model, shape) for key, shape in made.items()}
+    return [hands[d.shape.tobytes()] for d in demonstrations]

@@ -1,0 +1,110 @@
+"""A hand that holds an object: the posture near a recorded one in which finger tips touch and nothing sinks in.
+
+Capture is off by a centimetre where a hand hides behind the object that it holds. What it must have been follows from
+two facts: fingers that carry an object touch it, and neither gives way.
+"""
+
+import dataclasses
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from envs.signed_distance import signed_distance
+from mjx_hand.hand.joints import NUM_HINGES, TIP_LINKS
+from mjx_hand.pytree import replace
+from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics
+from mjx_hand.rotations import exp
+
+_ALONG = np.linspace(0.0, 1.0, 7)
+# What a residual of 1 is worth: a gap at a finger tip, a depth, and how far capture is off (m, rad).
+_TOUCH, _CLEAR, _LIMIT = 0.001, 0.0005, 0.02
+_OFF_PLACE, _OFF_TURN, _OFF_ANGLE = 0.01, 0.1, 0.15
+
+
+@dataclasses.dataclass(frozen=True)
+class Holding:
+    """A hand and the object in it.
+
+    Attributes:
+        angles: hinge angles (rad).
+        rotation, position: the object in the wrist's frame (m).
+    """
+
+    angles: Float[np.ndarray, "20"]
+    rotation: Float[np.ndarray, "3 3"]
+    position: Float[np.ndarray, "3"]
+
+
+def solve_holding(recorded: Holding, hand: RigidHand, planes: Float[np.ndarray, "h f 4"]) -> Holding:
+    """The holding nearest to a recorded one in which the last phalanges touch and no link is inside the object.
+
+    Args:
+        recorded: as captured.
+        hand: the twin's; its capsules stand for its skin.
+        planes: of the object's convex pieces (`envs.signed_distance.hull_planes`).
+    """
+    bare = jax.tree.map(jnp.asarray, replace(hand, mesh_vertices=(), mesh_faces=()))
+    residual = jax.jit(
+        partial(_residual, hand=bare, recorded=jax.tree.map(jnp.asarray, _rows(recorded)), planes=planes)
+    )
+    slope = jax.jit(jax.jacfwd(residual))
+    start = np.concatenate([recorded.angles, np.zeros(6)])
+    found = least_squares(
+        lambda x: np.asarray(residual(x), float),
+        start,
+        jac=lambda x: np.asarray(slope(x), float),  # type: ignore[arg-type]
+    )
+    x = found.x
+    angles, rotation, position = (np.asarray(a, float) for a in _placed(jnp.asarray(x), _rows(recorded)))
+    angles = np.clip(angles, hand.hinge_lower, hand.hinge_upper)
+    return Holding(angles=angles, rotation=Rotation.from_matrix(rotation).as_matrix(), position=position)
+
+
+def capsule_gaps(
+    angles: Float[Array | np.ndarray, "20"],
+    rotation: Float[Array | np.ndarray, "3 3"],
+    position: Float[Array | np.ndarray, "3"],
+    hand: RigidHand,
+    planes: Float[Array | np.ndarray, "h f 4"],
+) -> Float[Array, "c"]:
+    """Distance (m) of each of the hand's capsules from an object in its wrist's frame; negative inside."""
+    rot, pos = forward_kinematics(angles, hand)
+    links = jnp.array(hand.capsule_links)
+    ends = pos[links][:, None] + jnp.einsum("cij,cej->cei", rot[links], jnp.asarray(hand.capsule_ends))
+    points = ends[:, :1] + _ALONG[None, :, None] * (ends[:, 1:] - ends[:, :1])
+    in_object = (points - position) @ jnp.asarray(rotation)
+    return signed_distance("mesh", jnp.zeros(3), in_object, planes).min(axis=1) - jnp.asarray(hand.capsule_radius)
+
+
+def last_phalanges(hand: RigidHand) -> list[int]:
+    """The capsule of each finger's last link."""
+    return [max(k for k, link in enumerate(hand.capsule_links) if link == tip) for tip in TIP_LINKS]
+
+
+def _rows(holding: Holding) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return holding.angles, holding.rotation, holding.position
+
+
+def _placed(x: Array, recorded: tuple) -> tuple[Array, Array, Array]:
+    return x[:NUM_HINGES], exp(x[NUM_HINGES + 3 :]) @ recorded[1], recorded[2] + x[NUM_HINGES : NUM_HINGES + 3]
+
+
+def _residual(x: Array, hand: RigidHand, recorded: tuple, planes: np.ndarray) -> Float[Array, "r"]:
+    angles, rotation, position = _placed(x, recorded)
+    gaps = capsule_gaps(angles, rotation, position, hand, planes)
+    outside = jnp.maximum(angles - hand.hinge_upper, 0) + jnp.maximum(hand.hinge_lower - angles, 0)
+    return jnp.concatenate(
+        [
+            gaps[jnp.array(last_phalanges(hand))] / _TOUCH,
+            jnp.minimum(gaps, 0.0) / _CLEAR,
+            (angles - recorded[0]) / _OFF_ANGLE,
+            x[NUM_HINGES : NUM_HINGES + 3] / _OFF_PLACE,
+            x[NUM_HINGES + 3 :] / _OFF_TURN,
+            outside / _LIMIT,
+        ]
+    )
