@@ -133,10 +133,12 @@ def _cells(name: str, values: Sequence[float | None]) -> list[str]:
     given = [value for value in values if value is not None]
     if not given:
         return [""] * len(_columns("", len(values)))
-    mean, least, greatest = (score_text(name, value) for value in (float(np.mean(given)), min(given), max(given)))
+    mean = score_text(name, float(np.mean(given)))
     if len(values) == 1:
         return [mean]
-    return [mean, least if least == greatest else f"{least} to {greatest}"]
+    least, greatest = score_text(name, min(given)), score_text(name, max(given))
+    number = least.removesuffix(" %").removesuffix(" cm").removesuffix("°")
+    return [mean, least if least == greatest else f"{number} to {greatest}"]
 
 
 def _outcome(evaluation: Evaluation, demonstration: int) -> str:

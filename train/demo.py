@@ -96,7 +96,7 @@ def _report(
     timings: list[tuple[str, float]],
 ) -> Report:
     rows = {title: evaluation.rows() for title, evaluation in results.evaluations.items()}
-    scores, failures = tables({config.seed: results}, config)
+    scores, failures, *by_type = tables({config.seed: results}, config)
     paper = PAPER.get(config.data.grasp)
     joints = [name.replace("1", " base").replace("2", " middle").replace("3", " end") for name in LINKS[1:]]
     rotations = {m: np.rad2deg(e.rotation[e.valid]) for m, e in errors.items()}
@@ -127,6 +127,7 @@ def _report(
             Section("Learning", [Plot(_learning_curve(points), _LEARNING)]),
             Section("Tracking error over time", [Plot(tracking_plot({config.seed: results}), TRACKING)]),
             Section("Success by every metric", [scores]),
+            *([Section("Every grasp type", by_type)] if by_type else []),
             Section("How failures failed", [failures]),
             Section("From recorded rotations to hinges", [Plot(plots.joint_errors(joints, rotations), _PROJECTION)]),
             Section(

@@ -81,9 +81,9 @@ def evaluation_page(results: Mapping[int, Results], configs: Sequence[Config], s
     return Report(
         title=f"{config.name}: evaluation",
         task=(
-            f"{len(objects)} held-out demonstrations ({', '.join(dict.fromkeys(_grasps(first)))}), by people and with "
-            "objects that training has not seen, from the first frame to the last, unassisted; policies of "
-            f"{len(policies)} training seeds."
+            f"{len(objects)} held-out demonstrations ({', '.join(dict.fromkeys(_grasps(first)))}), which training has "
+            "not seen, from the first frame to the last, unassisted; policies of "
+            f"{len(policies)} training seed{'s' if len(policies) > 1 else ''}."
         ),
         headlines=(
             Headline("success", f"{np.mean(success):.1f} %", _between(success, "%", 1)),

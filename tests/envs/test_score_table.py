@@ -59,8 +59,8 @@ def test_several_seeds_have_their_mean_and_their_range():
     table = score_table({"policy": seeds, "zero residual": [evaluation([False] * 2)]}, PAPER["pinch"])
     assert table.columns == ("", "policy, mean of 3 seeds", "least to greatest", "zero residual", "paper")
     shown = {row[0]: row[1:] for row in table.rows}
-    assert shown[TITLES["manip_trans_object"]] == ("83.3 %", "50.0 % to 100.0 %", "0.0 %", "")
-    assert shown[TITLES["tracking_error_cm"]] == ("1.75 cm", "0.50 cm to 4.25 cm", "8.00 cm", "0.95 cm")
+    assert shown[TITLES["manip_trans_object"]] == ("83.3 %", "50.0 to 100.0 %", "0.0 %", "")
+    assert shown[TITLES["tracking_error_cm"]] == ("1.75 cm", "0.50 to 4.25 cm", "8.00 cm", "0.95 cm")
     assert ("dropped", "16.7 %") in failure_table({"policy": seeds}).rows
 
 
