@@ -90,7 +90,7 @@ def _composed(overrides: Sequence[str]) -> DictConfig:
                 _check_key(base, override.split("=", 1)[0].lstrip("+~"))
             return hydra.compose("train", list(overrides))
     except (HydraException, OmegaConfBaseException) as error:
-        raise InputError(_one_line(error)) from None
+        raise InputError(one_line(error)) from None
 
 
 def of_seeds(composed: DictConfig) -> list[Config]:
@@ -157,7 +157,7 @@ def _command(task: Callable[[DictConfig], object]) -> None:
         try:
             task(composed)
         except InputError as error:
-            _refuse(error)
+            refuse(error)
 
     _store_schema()
     enable_compile_cache()
@@ -166,11 +166,12 @@ def _command(task: Callable[[DictConfig], object]) -> None:
         try:
             of_seeds(_composed(arguments))
         except InputError as error:
-            _refuse(error)
+            refuse(error)
     hydra.main(version_base=None, config_path="pkg://configs", config_name="train")(job)()
 
 
-def _refuse(error: InputError) -> None:
+def refuse(error: InputError) -> None:
+    """End the process with one line and status 2."""
     print(f"train: {error}", file=sys.stderr)
     sys.exit(2)
 
@@ -210,7 +211,7 @@ def _check_key(base: DictConfig, key: str) -> None:
         node = node[part]
 
 
-def _one_line(error: Exception) -> str:
+def one_line(error: Exception) -> str:
     """What Hydra or OmegaConf says, without its search paths and types; the cause says more than the wrapper."""
     text = str(error.__cause__ or error).split("Config search path")[0]
     lines = [line.strip().rstrip(":") for line in text.splitlines() if line.strip()]

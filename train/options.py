@@ -123,10 +123,12 @@ class Play:
 
     Attributes:
         demonstration: number of a held-out demonstration; null for the one of median tracking error.
+        unstable: file of a simulation that diverged (`debug.nan_guard`), to show instead of a policy.
         port: to serve the viewer at; 0 chooses a free one.
     """
 
     demonstration: int | None = None
+    unstable: str = ""
     port: int = 8080
 
     def __post_init__(self):

@@ -1,7 +1,8 @@
 """Play a policy in the browser, in real time: `python -m train.play config=pinch`.
 
 Shows a held-out demonstration, its twin under the policy, the object, and the error. `play.demonstration=3` chooses
-one; without it, the one of median tracking error.
+one; without it, the one of median tracking error. `play.unstable=FILE` shows a simulation that diverged in training
+instead: the state before the step, and each physics step of it that the engine could make.
 """
 
 import numpy as np
@@ -14,10 +15,32 @@ from train.config import Config, command
 from train.experiment import chosen_checkpoint, make_world
 from train.play_scene import rollout_scene
 from train.policy import deterministic_policy
+from train.unstable import load_unstable
+from train.unstable_scene import unstable_scene
 
 
 def viewer(config: Config) -> Viewer:
-    """The rollout in a viewer, paused at its first frame.
+    """The rollout, or the simulation that diverged, in a viewer, paused at its first frame.
+
+    Raises:
+        InputError: what `rollout_viewer`, `unstable_viewer` and `Viewer` refuse.
+    """
+    return unstable_viewer(config) if config.play.unstable else rollout_viewer(config)
+
+
+def unstable_viewer(config: Config) -> Viewer:
+    """The file `play.unstable` in a viewer.
+
+    Raises:
+        InputError: no such file, or one of other demonstrations.
+    """
+    unstable = load_unstable(config.play.unstable)
+    world = make_world(config, "train")
+    return Viewer(unstable_scene(unstable, world, config.name), config.play.port)
+
+
+def rollout_viewer(config: Config) -> Viewer:
+    """A rollout of the policy in a viewer.
 
     Raises:
         InputError: no such demonstration, or what `chosen_checkpoint` and `Viewer` refuse.

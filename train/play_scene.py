@@ -1,6 +1,7 @@
 """A rollout as a scene for the browser viewer: demonstration, twin, object, and how far the twin is from it."""
 
 import numpy as np
+from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from envs.metrics import position_error, rotation_error
@@ -44,8 +45,8 @@ def rollout_scene(demonstration: Demonstration, rollouts: Rollouts, index: int, 
         twin_layer(done, hand, "twin"),
         skin,
         replace(wanted, name="object", transforms=moved),
-        _ghost(twin_layer(shown.motion, hand, "demonstration")),
-        _ghost(replace(wanted, name="demonstrated object")),
+        ghost(twin_layer(shown.motion, hand, "demonstration")),
+        ghost(replace(wanted, name="demonstrated object")),
         *support,
     )
     curves = (
@@ -57,11 +58,15 @@ def rollout_scene(demonstration: Demonstration, rollouts: Rollouts, index: int, 
 
 def twin_motion(demonstration: Demonstration, rollouts: Rollouts, index: int) -> JointMotion:
     """What the hand of rollout `index` did in the demonstration's frames."""
-    qpos = rollouts.qpos[index, rollouts.counted[index]]
+    return posed(demonstration, rollouts.qpos[index, rollouts.counted[index]], rollouts.fps)
+
+
+def posed(demonstration: Demonstration, qpos: Float[np.ndarray, "t q"], fps: float) -> JointMotion:
+    """The motion of a hand in these coordinates of a demonstration's scene."""
     base = base_rotation(demonstration)
     turned = Rotation.from_matrix(base) * Rotation.from_euler("XYZ", qpos[:, 3:NUM_WRIST])
     return JointMotion(
-        fps=rollouts.fps,
+        fps=fps,
         angles=qpos[:, NUM_WRIST : NUM_WRIST + NUM_HINGES],
         wrist_position=qpos[:, :3] @ base.T,
         wrist_quaternion=turned.as_quat(scalar_first=True),
@@ -69,6 +74,11 @@ def twin_motion(demonstration: Demonstration, rollouts: Rollouts, index: int) ->
         side=demonstration.motion.side,
         source="twin",
     )
+
+
+def ghost(layer: MeshLayer | SkinLayer) -> MeshLayer | SkinLayer:
+    """The layer, grey and faint."""
+    return replace(layer, colour=_GHOST, opacity=_FAINT)
 
 
 def _first(motion: JointMotion, frames: int) -> JointMotion:
@@ -80,7 +90,3 @@ def _first(motion: JointMotion, frames: int) -> JointMotion:
         wrist_quaternion=motion.wrist_quaternion[:frames],
         valid=motion.valid[:frames],
     )
-
-
-def _ghost(layer: MeshLayer | SkinLayer) -> MeshLayer | SkinLayer:
-    return replace(layer, colour=_GHOST, opacity=_FAINT)

@@ -7,7 +7,7 @@ its last state when the same command is given again, and ends as it would have e
 
 import dataclasses
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +21,14 @@ from envs.rolling import make_roll_out
 from mjx_hand.motion.archive import replacing
 from mjx_hand.view.progress import counter
 from train.checkpoint import Checkpoint, save_checkpoint
-from train.config import Config, command
+from train.config import Config
 from train.experiment import World, make_world
 from train.interruption import interruptions
 from train.learner import Learner, LearnerState
 from train.policy import deterministic_policy
 from train.processes import agreed, first_alone_speaks, gathered, is_first, join
 from train.run_folder import RunFolder
+from train.sweep import sweepable_command
 from train.unstable import UnstableLog
 
 _LOG_SECONDS = 2.0  # between two lines of training metrics
@@ -110,7 +111,9 @@ class _Run:
         self.between = max(config.checks.every // each, 1)
         self.start = time.monotonic() - seconds
         policy = deterministic_policy(config.ppo, world.env.observation_size, world.env.action_size)
-        self.unstable = UnstableLog(folder.path / "unstable", world.env) if config.debug.nan_guard else None
+        self.unstable = (
+            UnstableLog(folder.path / "unstable", world.env, config.seed) if config.debug.nan_guard else None
+        )
         self.roll_out = make_roll_out(world.env, world.hands, policy)
 
     @property
@@ -212,12 +215,17 @@ def _write_curve(points: list[Point], path: Path) -> None:
         temporary.write_text("\n".join(lines) + "\n")
 
 
-def main(config: Config) -> None:
-    """Join the other processes, if there are any, and train."""
+def main(config: Config) -> Mapping[str, str]:
+    """Join the other processes, if there are any, and train; what the last evaluation said."""
     join(config.distributed)
     with first_alone_speaks():
-        train(config)
+        last = train(config)[-1]
+    return {
+        "steps": f"{last.steps:,}",
+        "success": f"{100 * last.success:.1f} %",
+        "tracking error": f"{last.tracking_error_cm:.2f} cm",
+    }
 
 
 if __name__ == "__main__":
-    command(main)
+    sweepable_command(main)

@@ -1,7 +1,8 @@
 """Simulations that diverged in training: their last good state on disk, and the step that broke them, again.
 
-With `debug.nan_guard=true` each is written to `out/unstable/STEPS-WORLD.npz` (schema mjx-hand/unstable/1): the
-demonstration and frame, qpos and qvel before the step (MuJoCo's layout), and what the actuators were told.
+With `debug.nan_guard=true` each is written to `out/unstable/STEPS-WORLD.npz` (schema mjx-hand/unstable/2): the seed,
+control steps so far and world, the demonstration and frame, qpos and qvel before the step (MuJoCo's layout), and what
+the actuators were told. `python -m train.play play.unstable=FILE` shows it.
 """
 
 import dataclasses
@@ -17,7 +18,7 @@ from envs.tracking import TrackingEnv
 from mjx_hand.motion.archive import load_arrays, save_arrays
 from mjx_hand.motion.layout import numbers
 
-SCHEMA = "mjx-hand/unstable/1"
+SCHEMA = "mjx-hand/unstable/2"
 _MOST = 50  # files a training; what diverges everywhere needs no thousand examples
 
 
@@ -26,11 +27,15 @@ class Unstable:
     """One step that diverged.
 
     Attributes:
+        seed, steps, world: of the training, its control steps before, and which of its worlds.
         demonstration, frame: what the world was following, and where.
         qpos, qvel: the state before the step.
         targets: of the actuators during it (m, rad).
     """
 
+    seed: int
+    steps: int
+    world: int
     demonstration: int
     frame: int
     qpos: Float[np.ndarray, "q"]
@@ -44,10 +49,11 @@ class UnstableLog:
     Args:
         folder: of the files; made when the first is written.
         env: the environment of the worlds.
+        seed: of the training.
     """
 
-    def __init__(self, folder: Path, env: TrackingEnv):
-        self.folder, self.env = folder, env
+    def __init__(self, folder: Path, env: TrackingEnv, seed: int):
+        self.folder, self.env, self.seed = folder, env, seed
         self.seen: np.ndarray | None = None
 
     def write(self, steps: int, caught: Caught) -> list[Path]:
@@ -62,6 +68,9 @@ class UnstableLog:
             twin, action = jax.tree.map(lambda leaf, world=world: leaf[world], (caught.twin, caught.action))
             path = self.folder / f"{steps:012d}-{world}.npz"
             arrays = {
+                "seed": self.seed,
+                "steps": steps,
+                "world": int(world),
                 "demonstration": int(twin.demonstration),
                 "frame": int(twin.frame),
                 "qpos": np.asarray(twin.physics.qpos),
@@ -80,11 +89,11 @@ def load_unstable(path: str | Path) -> Unstable:
         InputError: it is not such a file.
     """
     arrays = load_arrays(path, SCHEMA)
-    layout = {"demonstration": (), "frame": (), "qpos": ("q",), "qvel": ("v",), "targets": (26,)}
+    whole = ("seed", "steps", "world", "demonstration", "frame")
+    layout = {**dict.fromkeys(whole, ()), "qpos": ("q",), "qvel": ("v",), "targets": (26,)}
     found = numbers(path, arrays, layout, finite=False)
     return Unstable(
-        demonstration=int(found["demonstration"]),
-        frame=int(found["frame"]),
+        **{name: int(found[name]) for name in whole},
         qpos=found["qpos"],
         qvel=found["qvel"],
         targets=found["targets"],
