@@ -28,7 +28,7 @@ class Task:
     substeps: int = 5
     wrist_move: float = 0.02
     wrist_turn: float = 0.10
-    finger: float = 0.25
+    finger: float = 0.35
     smoothing: float = 0.9
     position_sharpness: float = 30.0
     rotation_sharpness: float = 2.0

@@ -54,7 +54,7 @@ class CaptureSettings:
     fps: float = 120.0
     marker_noise: float = 0.0005
     gap_fraction: float = 0.05
-    off_axis: float = 0.3
+    off_axis: float = 1.0
     object_noise: float = 0.0002
     rate: float = 50.0
     cutoff: float = CUTOFF

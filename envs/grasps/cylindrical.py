@@ -6,7 +6,7 @@ GRASP = GraspType(
     name="cylindrical",
     object_kind="cylinder",
     object_size=((0.0275, 0.085, 0.0), (0.0375, 0.085, 0.0)),
-    object_mass=(0.2, 0.5),
+    object_mass=(0.3, 0.9),
     object_friction=(0.8, 1.0),
     contacts=(
         *(Contact(f"{finger}{phalanx}", 0.6) for finger in ("index", "middle", "ring", "pinky") for phalanx in (2, 3)),
@@ -37,5 +37,5 @@ GRASP = GraspType(
     lift=(0.11, 0.15),
     carry=(0.06, 0.10),
     turn=(0.35, 0.52),
-    grip_force=8.0,
+    grip_force=2.0,
 )

@@ -6,7 +6,7 @@ GRASP = GraspType(
     name="lateral",
     object_kind="box",
     object_size=((0.040, 0.0014, 0.025), (0.046, 0.0016, 0.029)),
-    object_mass=(0.02, 0.08),
+    object_mass=(0.05, 0.25),
     object_friction=(0.8, 1.0),
     support=(
         Box((0.03, 0.004, 0.0075), (0.0, 0.0065, 0.0075)),
@@ -27,9 +27,9 @@ GRASP = GraspType(
     # palm down, fingers along world +x, thumb towards world +y
     wrist_rotation=((-1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)),
     approach=(0.0, -0.006, 0.07),
-    closing=Pads(opening=0.015, force=7.0),
+    closing=Pads(opening=0.015, force=10.0),
     lift=(0.11, 0.15),
     carry=(0.06, 0.10),
     turn=(0.35, 0.52),
-    grip_force=2.5,  # with 8 N three cards in four are held without learning
+    grip_force=2.0,
 )

@@ -6,7 +6,7 @@ GRASP = GraspType(
     name="pinch",
     object_kind="box",
     object_size=((0.0150, 0.0150, 0.0150), (0.0190, 0.0190, 0.0190)),
-    object_mass=(0.05, 0.2),
+    object_mass=(0.1, 0.5),
     object_friction=(0.8, 1.0),
     support=(Box((0.03, 0.03, 0.015), (0.0, 0.0, 0.015)),),
     rest=0.03,
@@ -25,9 +25,9 @@ GRASP = GraspType(
     # palm down, fingers along world +x and tilted 35 degrees towards the table
     wrist_rotation=((-0.819, 0.574, 0.0), (0.0, 0.0, 1.0), (0.574, 0.819, 0.0)),
     approach=(0.0, 0.0, 0.07),
-    closing=Pads(opening=0.015, force=9.0),
+    closing=Pads(opening=0.015, force=12.0),
     lift=(0.10, 0.15),
     carry=(0.06, 0.10),
     turn=(0.35, 0.52),
-    grip_force=8.0,
+    grip_force=2.0,
 )

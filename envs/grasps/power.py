@@ -6,8 +6,8 @@ GRASP = GraspType(
     name="power",
     object_kind="capsule",
     object_size=((0.017, 0.1, 0.0), (0.023, 0.1, 0.0)),
-    object_mass=(0.3, 0.6),
-    object_friction=(0.8, 1.0),
+    object_mass=(1.2, 2.0),
+    object_friction=(0.6, 0.8),
     object_rotation=((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)),  # along world y
     support=(Box((0.03, 0.012, 0.06), (0.0, 0.1, 0.06)), Box((0.03, 0.012, 0.06), (0.0, -0.1, 0.06))),
     rest=0.12,
@@ -40,5 +40,5 @@ GRASP = GraspType(
     lift=(0.11, 0.15),
     carry=(0.06, 0.10),
     turn=(0.35, 0.52),
-    grip_force=1.0,  # more rolls the handle out of the hand
+    grip_force=2.0,
 )

@@ -6,7 +6,7 @@ GRASP = GraspType(
     name="spherical",
     object_kind="sphere",
     object_size=((0.0275, 0.0, 0.0), (0.0375, 0.0, 0.0)),
-    object_mass=(0.1, 0.3),
+    object_mass=(0.2, 0.6),
     object_friction=(0.8, 1.0),
     # a frame of four slats, which the ball dips into a little
     support=(
@@ -45,5 +45,5 @@ GRASP = GraspType(
     lift=(0.11, 0.15),
     carry=(0.06, 0.10),
     turn=(0.35, 0.52),
-    grip_force=8.0,
+    grip_force=2.0,
 )
