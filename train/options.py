@@ -20,7 +20,7 @@ class Ppo:
         initial_std: standard deviation of actions at first; a residual of 1 is the task's full range.
     """
 
-    num_timesteps: int = 1_000_000
+    num_timesteps: int = 600_000
     num_envs: int = 256
     unroll_length: int = 16
     num_minibatches: int = 8
