@@ -34,7 +34,7 @@ ALL = "all"
 YIELD = "yield.json"
 AS_RECORDED, VARIED = "as recorded", "varied"  # what a set from a recording counts
 _VERSION = 3  # of the generator: a change that makes other demonstrations of the same settings raises it
-_RECORDED_VERSION = 1  # the same of what is made of a recording
+_RECORDED_VERSION = 2  # the same of what is made of a recording
 _APART = 1_000_003  # between the seeds of the parts
 _SHAPE_LIMIT = 2.0  # standard deviations
 

@@ -1,7 +1,8 @@
-"""A hand that holds an object: the posture near a recorded one in which finger tips touch and nothing sinks in.
+"""A hand that holds an object: the posture near a recorded one in which it could.
 
-Capture is off by a centimetre where a hand hides behind the object that it holds. What it must have been follows from
-two facts: fingers that carry an object touch it, and neither gives way.
+Capture is off by centimetres where a hand and an object hide each other, and an object that looks nearly the same from
+all sides is seen turned about its own axis by any angle. What it must have been follows from three facts: fingers that
+carry an object touch it, neither gives way, and the thumb is against the fingers.
 """
 
 import dataclasses
@@ -15,7 +16,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from envs.signed_distance import signed_distance
-from mjx_hand.hand.joints import NUM_HINGES, TIP_LINKS
+from mjx_hand.hand.joints import FINGERS, NUM_HINGES, TIP_LINKS
 from mjx_hand.pytree import replace
 from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics
 from mjx_hand.rotations import exp
@@ -23,7 +24,12 @@ from mjx_hand.rotations import exp
 _ALONG = np.linspace(0.0, 1.0, 7)
 # What a residual of 1 is worth: a gap at a finger tip, a depth, and how far capture is off (m, rad).
 _TOUCH, _CLEAR, _LIMIT = 0.001, 0.0005, 0.02
-_OFF_PLACE, _OFF_TURN, _OFF_ANGLE = 0.01, 0.1, 0.15
+_OPPOSED, _NEAR = 0.1, 0.02  # directions that should be opposite; middle phalanges and palm, which need not touch (m)
+_OFF_PLACE, _OFF_TURN, _OFF_SPIN, _OFF_ANGLE = 0.015, 0.1, 0.8, 0.25
+_STEPS = 60
+_SPINS = np.deg2rad([-60, -20, 20, 60])  # about the object's axis: where to start looking
+_INWARDS = 0.01  # m towards the palm, likewise
+_PALM = np.array([0.0, 1.0, 0.0])  # towards the back of the hand
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,17 +55,19 @@ def solve_holding(recorded: Holding, hand: RigidHand, planes: Float[np.ndarray, 
         planes: of the object's convex pieces (`envs.signed_distance.hull_planes`).
     """
     bare = jax.tree.map(jnp.asarray, replace(hand, mesh_vertices=(), mesh_faces=()))
-    residual = jax.jit(
-        partial(_residual, hand=bare, recorded=jax.tree.map(jnp.asarray, _rows(recorded)), planes=planes)
-    )
+    residual = jax.jit(partial(_residual, hand=bare, recorded=_rows(recorded), planes=planes))
     slope = jax.jit(jax.jacfwd(residual))
-    start = np.concatenate([recorded.angles, np.zeros(6)])
-    found = least_squares(
-        lambda x: np.asarray(residual(x), float),
-        start,
-        jac=lambda x: np.asarray(slope(x), float),  # type: ignore[arg-type]
-    )
-    x = found.x
+    found = []
+    for spin in _SPINS:
+        found.append(
+            least_squares(
+                lambda x: np.asarray(residual(x), float),
+                np.concatenate([recorded.angles, _INWARDS * _PALM, [0.0, 0.0, spin]]),
+                jac=lambda x: np.asarray(slope(x), float),  # type: ignore[arg-type]
+                max_nfev=_STEPS,
+            )
+        )
+    x = min(found, key=lambda one: one.cost).x
     angles, rotation, position = (np.asarray(a, float) for a in _placed(jnp.asarray(x), _rows(recorded)))
     angles = np.clip(angles, hand.hinge_lower, hand.hinge_upper)
     return Holding(angles=angles, rotation=Rotation.from_matrix(rotation).as_matrix(), position=position)
@@ -73,12 +81,8 @@ def capsule_gaps(
     planes: Float[Array | np.ndarray, "h f 4"],
 ) -> Float[Array, "c"]:
     """Distance (m) of each of the hand's capsules from an object in its wrist's frame; negative inside."""
-    rot, pos = forward_kinematics(angles, hand)
-    links = jnp.array(hand.capsule_links)
-    ends = pos[links][:, None] + jnp.einsum("cij,cej->cei", rot[links], jnp.asarray(hand.capsule_ends))
-    points = ends[:, :1] + _ALONG[None, :, None] * (ends[:, 1:] - ends[:, :1])
-    in_object = (points - position) @ jnp.asarray(rotation)
-    return signed_distance("mesh", jnp.zeros(3), in_object, planes).min(axis=1) - jnp.asarray(hand.capsule_radius)
+    distance = signed_distance("mesh", jnp.zeros(3), _axes(angles, rotation, position, hand), planes)
+    return distance.min(axis=1) - jnp.asarray(hand.capsule_radius)
 
 
 def last_phalanges(hand: RigidHand) -> list[int]:
@@ -86,25 +90,51 @@ def last_phalanges(hand: RigidHand) -> list[int]:
     return [max(k for k, link in enumerate(hand.capsule_links) if link == tip) for tip in TIP_LINKS]
 
 
+def spin_of(turn: Float[np.ndarray, "3 3"]) -> float:
+    """The share of a rotation that turns about z (rad)."""
+    _, _, z, w = Rotation.from_matrix(turn).as_quat()
+    return float(2 * np.arctan2(z, w))
+
+
+def _axes(angles: Array, rotation: Array, position: Array, hand: RigidHand) -> Float[Array, "c n 3"]:
+    """Points on the capsules' axes in the object's frame (m)."""
+    rot, pos = forward_kinematics(angles, hand)
+    links = jnp.array(hand.capsule_links)
+    ends = pos[links][:, None] + jnp.einsum("cij,cej->cei", rot[links], jnp.asarray(hand.capsule_ends))
+    points = ends[:, :1] + _ALONG[None, :, None] * (ends[:, 1:] - ends[:, :1])
+    return (points - position) @ jnp.asarray(rotation)
+
+
 def _rows(holding: Holding) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return holding.angles, holding.rotation, holding.position
 
 
 def _placed(x: Array, recorded: tuple) -> tuple[Array, Array, Array]:
-    return x[:NUM_HINGES], exp(x[NUM_HINGES + 3 :]) @ recorded[1], recorded[2] + x[NUM_HINGES : NUM_HINGES + 3]
+    """Angles, and the object in the wrist's frame, turned in its own axes."""
+    return x[:NUM_HINGES], recorded[1] @ exp(x[NUM_HINGES + 3 :]), recorded[2] + x[NUM_HINGES : NUM_HINGES + 3]
 
 
 def _residual(x: Array, hand: RigidHand, recorded: tuple, planes: np.ndarray) -> Float[Array, "r"]:
     angles, rotation, position = _placed(x, recorded)
     gaps = capsule_gaps(angles, rotation, position, hand, planes)
+    tips = jnp.array(last_phalanges(hand))
+    places = _axes(angles, rotation, position, hand)[tips].mean(axis=1)[:, :2]  # about the object's axis
+    thumb = FINGERS.index("thumb")
+    opposite = _unit(places[thumb]) + _unit(jnp.delete(places, thumb, axis=0).mean(axis=0))
     outside = jnp.maximum(angles - hand.hinge_upper, 0) + jnp.maximum(hand.hinge_lower - angles, 0)
     return jnp.concatenate(
         [
-            gaps[jnp.array(last_phalanges(hand))] / _TOUCH,
+            gaps[tips] / _TOUCH,
             jnp.minimum(gaps, 0.0) / _CLEAR,
+            gaps / _NEAR,
+            opposite / _OPPOSED,
             (angles - recorded[0]) / _OFF_ANGLE,
             x[NUM_HINGES : NUM_HINGES + 3] / _OFF_PLACE,
-            x[NUM_HINGES + 3 :] / _OFF_TURN,
+            x[NUM_HINGES + 3 :] / jnp.array([_OFF_TURN, _OFF_TURN, _OFF_SPIN]),
             outside / _LIMIT,
         ]
     )
+
+
+def _unit(v: Array) -> Array:
+    return v / jnp.sqrt(jnp.sum(v * v) + 1e-8)

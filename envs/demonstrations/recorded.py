@@ -14,7 +14,7 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from envs.convex_pieces import convex_pieces
-from envs.demonstrations.holding import Holding, solve_holding
+from envs.demonstrations.holding import Holding, solve_holding, spin_of
 from envs.demonstrations.standing import Table, find_table, world_from_recording
 from envs.signed_distance import hull_planes
 from mjx_hand.capture.datasets.dexmv_object import RecordedObject, load_object, recording_files
@@ -37,10 +37,12 @@ from mjx_hand.rigid.rigid_hand import RigidHand, chain, forward_kinematics, tip_
 
 RECORDED = "recorded"  # what a demonstration that is of no grasp type calls its grasp
 _SAME = np.deg2rad(25.0)  # an object seen turned more than this in a hand that holds it was not seen rightly
+_ARRIVED, _LEAVING = 11, 2  # frames before the object is away between which the hand is at it
 _ROUNDS = 5  # of a robust mean
 # s before the lift: from when to when the recorded reach goes over into the holding. The correction is as large as
 # capture's error at the lift; made late, it would go through the object.
 _CLOSING, _HELD = 1.4, 0.4
+_FOOT = 0.004  # m above its lowest corner
 _RISEN = 0.01  # m above its place: the object leaves the table
 
 
@@ -81,7 +83,10 @@ def read_demonstration(
     holding = solve_holding(held, hand, hull_planes(description.hulls))
     times = now.times - table.lifted / motion.fps
     share = _minimum_jerk((times + _CLOSING) / (_CLOSING - _HELD))
-    rotation = now.rotation @ holding.rotation.T
+    # An object that looks the same from all sides was turned about its axis otherwise than it seemed, and not the hand.
+    spin = Rotation.from_rotvec([0.0, 0.0, spin_of(held.rotation.T @ holding.rotation)]).as_matrix()
+    object_rotation = now.rotation @ spin
+    rotation = object_rotation @ holding.rotation.T
     position = now.position - np.einsum("tij,j->ti", rotation, holding.position)
     angles = now.angles + share[:, None] * (holding.angles - now.angles)
     source = f"{motion.source} with {mesh.name}"
@@ -95,7 +100,7 @@ def read_demonstration(
             side=motion.side,
             source=source,
         ),
-        object_pose=np.concatenate([now.position, matrix_quaternions(now.rotation)], axis=1),
+        object_pose=np.concatenate([now.position, matrix_quaternions(object_rotation)], axis=1),
         object=description,
         support=np.zeros((0, 3)),
         support_position=np.zeros((0, 3)),
@@ -129,6 +134,8 @@ def _angles(motion: Motion, model: HandModel) -> tuple[Float[np.ndarray, "s"], F
 
 def _description(thing: RecordedObject, mass: float, friction: float, pieces: int) -> ObjectDescription:
     hulls = convex_pieces(thing.vertices, thing.faces, concavity=0.03, most=pieces)
+    low = hulls[..., 2] < hulls[..., 2].min() + _FOOT
+    hulls[low, 2] = hulls[..., 2].min()  # what stands has a flat foot, and few corners make it none
     return ObjectDescription(
         kind="mesh", size=np.abs(hulls).max(axis=(0, 1)), mass=mass, friction=friction, hulls=hulls
     )
@@ -172,7 +179,7 @@ def _mended(seen: _Seen, lifted: int) -> tuple[Holding, _Seen]:
     credible = np.concatenate([np.zeros(lifted, bool), (mean.inv() * apart).magnitude() < _SAME])
     held = Holding(
         angles=np.median(seen.angles[credible], axis=0),
-        rotation=mean.as_matrix(),
+        rotation=(_half_way(mean, seen, lifted) * mean).as_matrix(),
         position=np.median(placed[credible], axis=0),
     )
     home = np.array([0.0, 0.0, np.median(seen.position[: lifted // 2, 2])])
@@ -182,6 +189,19 @@ def _mended(seen: _Seen, lifted: int) -> tuple[Holding, _Seen]:
     turns = fill_turns(matrix_quaternions(rotation), stands | credible)
     position = np.where(stands[:, None], home, seen.position)
     return held, dataclasses.replace(seen, rotation=quaternion_matrices(turns), position=position)
+
+
+def _half_way(mean: Rotation, seen: _Seen, lifted: int) -> Rotation:
+    """From how the object's axis lies in the hand that carries it half way to how it does when the hand arrives.
+
+    Both are measured, as badly, and in a firm grasp they are one.
+    """
+    carried = mean.apply([0.0, 0.0, 1.0])
+    arriving = seen.hand_rotation[lifted - _ARRIVED : lifted - _LEAVING, 2].mean(axis=0)  # world's z in the hand
+    arriving /= np.linalg.norm(arriving)
+    axis = np.cross(carried, arriving)
+    angle = np.arctan2(np.linalg.norm(axis), carried @ arriving)
+    return Rotation.from_rotvec(axis / max(np.linalg.norm(axis), 1e-9) * angle / 2)
 
 
 def _upright(rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
