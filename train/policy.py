@@ -15,7 +15,8 @@ def network_factory(ppo: Ppo) -> Callable[..., networks.PPONetworks]:
     """What Brax PPO makes its networks with.
 
     Actions are normal with a deviation that does not depend on the state and starts small: a residual that begins as
-    loud noise shakes the object out of the hand before anything can be learned from holding it.
+    loud noise shakes the object out of the hand before anything can be learned from holding it. Their mean starts at
+    next to nothing, so that a learning curve starts at the zero-residual baseline.
     """
     return functools.partial(
         networks.make_ppo_networks,
@@ -24,6 +25,8 @@ def network_factory(ppo: Ppo) -> Callable[..., networks.PPONetworks]:
         distribution_type="normal",
         noise_std_type="log",
         init_noise_std=ppo.initial_std,
+        mean_kernel_init_fn=jax.nn.initializers.variance_scaling,
+        mean_kernel_init_kwargs={"scale": 1e-4, "mode": "fan_in", "distribution": "uniform"},
     )
 
 
