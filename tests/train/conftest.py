@@ -51,7 +51,7 @@ def tiny(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureReques
 
 @pytest.fixture(scope="session", autouse=True)
 def compiled_once() -> Iterator[None]:
-    """Trainings of one world share what is compiled: JAX keeps no compilation that calls the native engine."""
+    """Trainings of one world share what is traced and loaded, which takes seconds each time."""
     learners: dict[Any, Learner] = {}
     rollers: dict[Any, Any] = {}
 
