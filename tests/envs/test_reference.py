@@ -1,3 +1,5 @@
+import dataclasses
+
 import mujoco
 import numpy as np
 import pytest
@@ -96,8 +98,11 @@ def test_a_grip_is_part_of_the_controls(demonstrations, hands, reference, env):
 BALL = ObjectDescription(kind="sphere", size=np.array([0.0165, 0.0, 0.0]), mass=0.1, friction=1.0)
 
 
-def test_kinds_and_types_mix_and_each_is_as_if_it_were_alone(demonstrations, hands):
+def test_kinds_and_types_mix_and_each_is_as_if_it_were_alone(demonstrations, hands, monkeypatch):
     """Controls of a mixed set, in any order, are those of sets of one kind pressed with its own type's force."""
+    forces = {"lateral": 2.5, "pinch": 8.0, "spherical": 6.0}
+    changed = {name: dataclasses.replace(grasp_type(name), grip_force=force) for name, force in forces.items()}
+    monkeypatch.setattr("envs.reference.grasp_type", changed.get)
     first, second = demonstrations
     mixed = [
         replace(second, object=BALL, grasp="lateral"),
@@ -107,8 +112,7 @@ def test_kinds_and_types_mix_and_each_is_as_if_it_were_alone(demonstrations, han
     twins = [hands[1], hands[0], hands[0]]
     together = make_reference(mixed, twins, grip_force=None, gains=Gains())
     for k, (d, twin) in enumerate(zip(mixed, twins, strict=True)):
-        force = grasp_type(d.grasp).grip_force
-        alone = make_reference([d], [twin], grip_force=force, gains=Gains())
+        alone = make_reference([d], [twin], grip_force=forces[d.grasp], gains=Gains())
         assert np.abs(alone.grip).max() > 0.05
         for name in ("targets", "controls", "grip", "object_pose"):
             rows = np.asarray(getattr(together, name)[k, : d.num_frames])
