@@ -8,7 +8,7 @@ PIP_FLAGS := --quiet --disable-pip-version-check
 WORKERS ?= 2
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-slow lint format types bench lock clean
+.PHONY: help setup demo results test test-slow lint format types bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -37,6 +37,9 @@ $(STAMP): requirements.lock pyproject.toml
 
 demo: $(STAMP)  ## retarget a recording, train a pinch policy, write a report with plots and a video
 	$(BIN)/python -m train.demo
+
+results: $(STAMP)  ## train and evaluate the five grasp types, three seeds each, on one page (hours; goes on where it stopped)
+	$(BIN)/python -m train.results
 
 test: $(STAMP)  ## run the tests
 	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
