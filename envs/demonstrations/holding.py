@@ -6,6 +6,7 @@ carry an object touch it, neither gives way, and the thumb is against the finger
 """
 
 import dataclasses
+import itertools
 from functools import partial
 
 import jax
@@ -27,8 +28,8 @@ _TOUCH, _CLEAR, _LIMIT = 0.001, 0.0005, 0.02
 _OPPOSED, _NEAR = 0.1, 0.02  # directions that should be opposite; middle phalanges and palm, which need not touch (m)
 _OFF_PLACE, _OFF_TURN, _OFF_SPIN, _OFF_ANGLE = 0.015, 0.1, 0.8, 0.25
 _STEPS = 60
-_SPINS = np.deg2rad([-60, -20, 20, 60])  # about the object's axis: where to start looking
-_INWARDS = 0.01  # m towards the palm, likewise
+_SPINS = np.deg2rad(np.arange(-90, 91, 30))  # about the object's axis: where to start looking, as there are many minima
+_INWARDS = (0.0, 0.02)  # m towards the palm, likewise
 _PALM = np.array([0.0, 1.0, 0.0])  # towards the back of the hand
 
 
@@ -58,11 +59,11 @@ def solve_holding(recorded: Holding, hand: RigidHand, planes: Float[np.ndarray, 
     residual = jax.jit(partial(_residual, hand=bare, recorded=_rows(recorded), planes=planes))
     slope = jax.jit(jax.jacfwd(residual))
     found = []
-    for spin in _SPINS:
+    for spin, way in itertools.product(_SPINS, _INWARDS):
         found.append(
             least_squares(
                 lambda x: np.asarray(residual(x), float),
-                np.concatenate([recorded.angles, _INWARDS * _PALM, [0.0, 0.0, spin]]),
+                np.concatenate([recorded.angles, way * _PALM, [0.0, 0.0, spin]]),
                 jac=lambda x: np.asarray(slope(x), float),  # type: ignore[arg-type]
                 max_nfev=_STEPS,
             )
@@ -96,7 +97,9 @@ def spin_of(turn: Float[np.ndarray, "3 3"]) -> float:
     return float(2 * np.arctan2(z, w))
 
 
-def _axes(angles: Array, rotation: Array, position: Array, hand: RigidHand) -> Float[Array, "c n 3"]:
+def _axes(
+    angles: Array | np.ndarray, rotation: Array | np.ndarray, position: Array | np.ndarray, hand: RigidHand
+) -> Float[Array, "c n 3"]:
     """Points on the capsules' axes in the object's frame (m)."""
     rot, pos = forward_kinematics(angles, hand)
     links = jnp.array(hand.capsule_links)
