@@ -72,7 +72,7 @@ class ParallelEnv(Env):
         return state.replace(info=info)  # type: ignore[attr-defined]
 
     def _step(self, state: State, action: Float[Array, "26"]) -> State:
-        ours = {"truncation": state.info["truncation"]}
+        ours = {name: state.info[name] for name in ("truncation", "progress")}
         stepped = self.env.step(state.replace(info=ours), action)  # type: ignore[attr-defined]
         now, later = jax.random.split(state.info["rng"])
         fresh = self.env.reset(now)
@@ -83,7 +83,7 @@ class ParallelEnv(Env):
         sums = state.info["episode_metrics"]
         terms = {"sum_reward": stepped.reward, "length": jnp.ones(()), **stepped.metrics}
         info = {
-            "truncation": stepped.info["truncation"],
+            **{name: stepped.info[name] for name in ours},
             "rng": later,
             "episode_done": stepped.done,
             "episode_metrics": {name: sums[name] * going + value for name, value in terms.items()},

@@ -32,7 +32,7 @@ def assisted_replay(
     targets = np.asarray(reference.targets, float)
     pose = np.asarray(reference.object_pose, float)
     count, frames = targets.shape[:2]
-    low, high = models[0].actuator_ctrlrange.T
+    low, high = models[0].actuator_ctrlrange[:_NUM_TARGETS].T
     controls = np.clip(np.asarray(reference.controls, float), low, high)
     speed = _object_speed(pose, models[0].opt.timestep * substeps)
 
@@ -45,7 +45,7 @@ def assisted_replay(
     now[:, :_NUM_TARGETS], now[:, _NUM_TARGETS:] = targets[:, 0], pose[:, 0]
     qpos[:, 0] = now
     for t in range(1, frames):
-        worlds.bind("ctrl")[:] = controls[:, t]
+        worlds.bind("ctrl")[:, :_NUM_TARGETS] = controls[:, t]
         worlds.step(nstep=substeps)
         now[:, _NUM_TARGETS:], moving[:, _NUM_TARGETS:] = pose[:, t], speed[:, t]
         qpos[:, t], qvel[:, t] = now, moving

@@ -42,6 +42,7 @@ def scene_model(
     gains: Gains | None = None,
     visual: bool = False,
     spare: int = 0,
+    assisted: bool = False,
 ) -> mujoco.MjModel:
     """Compile the scene. qpos is the wrist's 3 slides (m) and 3 turns (rad), the 20 hinges, the object's free joint.
 
@@ -55,6 +56,8 @@ def scene_model(
         gains: of the hand's joints.
         visual: with the hand's meshes, for pictures; without them the model is small and quick.
         spare: how many boxes to add that touch nothing.
+        assisted: with six motors on the object, after the hand's actuators: a force (N, world axes) and a torque (N m,
+            the object's axes).
     """
     if thing.kind not in OBJECT_KINDS:
         raise InputError(f"object kind {thing.kind!r} is not known; valid: {', '.join(OBJECT_KINDS)}")
@@ -76,6 +79,9 @@ def scene_model(
         box.contype, box.conaffinity = _SPARE_MEETS
     body = spec.worldbody.add_body(name=OBJECT)
     body.add_freejoint(name=OBJECT)
+    for k, gear in enumerate(np.eye(6) if assisted else ()):
+        motor = spec.add_actuator(name=f"{OBJECT}_motor{k}", target=OBJECT, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        motor.gear = gear
     for geom in _object_geoms(spec, body, thing):
         geom.rgba = (0.9, 0.35, 0.2, 1.0)
         geom.contype, geom.conaffinity = _OBJECT_MEETS
@@ -136,6 +142,7 @@ def demonstration_model(
     gains: Gains | None = None,
     visual: bool = False,
     spare: int = 0,
+    assisted: bool = False,
 ) -> mujoco.MjModel:
     """The scene that a demonstration takes place in; arguments as of `scene_model`."""
     return scene_model(
@@ -147,11 +154,16 @@ def demonstration_model(
         gains=gains,
         visual=visual,
         spare=spare,
+        assisted=assisted,
     )
 
 
 def demonstration_models(
-    demonstrations: Sequence[Demonstration], hands: Sequence[RigidHand], *, gains: Gains | None = None
+    demonstrations: Sequence[Demonstration],
+    hands: Sequence[RigidHand],
+    *,
+    gains: Gains | None = None,
+    assisted: bool = False,
 ) -> list[mujoco.MjModel]:
     """The scenes of demonstrations that run side by side, each on its own hand.
 
@@ -160,7 +172,7 @@ def demonstration_models(
     """
     most = max(len(d.support) for d in demonstrations)
     return [
-        demonstration_model(d, hand, gains=gains, spare=most - len(d.support))
+        demonstration_model(d, hand, gains=gains, spare=most - len(d.support), assisted=assisted)
         for d, hand in zip(demonstrations, hands, strict=True)
     ]
 

@@ -18,7 +18,7 @@ from envs.physics import make_engine
 from envs.physics.engine import PhysicsState
 from envs.reference import make_reference
 from envs.replay import assisted_replay
-from envs.scene import NUM_WRIST, demonstration_models
+from envs.scene import NUM_WRIST, OBJECT, demonstration_models
 from envs.task import Task
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
@@ -73,7 +73,8 @@ class TrackingEnv(Env):
         self.task = Task() if task is None else task
         gains = Gains() if gains is None else gains
         self.reference = make_reference(demonstrations, hands, grip_force=self.task.grip_force, gains=gains)
-        self.models = demonstration_models(demonstrations, hands, gains=gains)
+        self.assisted = self.task.assist > 0
+        self.models = demonstration_models(demonstrations, hands, gains=gains, assisted=self.assisted)
         self.engine = make_engine(engine, self.models, self.task.substeps)
         self.dt = float(self.models[0].opt.timestep * self.task.substeps)
         self.fps = demonstrations[0].motion.fps
@@ -82,7 +83,9 @@ class TrackingEnv(Env):
                 f"demonstrations at {self.fps:g} frames/s do not fit control steps of {self.dt * 1000:g} ms; "
                 f"resample them to {1 / self.dt:g} frames/s"
             )
-        self._low, self._high = (jnp.asarray(side, jnp.float32) for side in self.models[0].actuator_ctrlrange.T)
+        low, high = self.models[0].actuator_ctrlrange[: self.action_size].T
+        self._low, self._high = jnp.asarray(low, jnp.float32), jnp.asarray(high, jnp.float32)
+        self._inertia = jnp.array([[m.body(OBJECT).mass[0], m.body(OBJECT).inertia.mean()] for m in self.models])
         self._starts = self._start_table()
 
     @property
@@ -121,14 +124,21 @@ class TrackingEnv(Env):
         )
         zero = jnp.zeros(())
         metrics = dict.fromkeys((*_TERMS, "error/position", "error/rotation", "unstable"), zero)
-        return State(twin, self._observe(twin), zero, zero, metrics, {"truncation": zero})  # type: ignore[call-arg]
+        info = {"truncation": zero, "progress": jnp.ones(())}
+        return State(twin, self._observe(twin), zero, zero, metrics, info)  # type: ignore[call-arg]
 
     def step(self, state: State, action: Float[Array, "26"]) -> State:
-        """One control step towards the next frame of the demonstration; past its end the last frame is held."""
+        """One control step towards the next frame of the demonstration; past its end the last frame is held.
+
+        `state.info["progress"]` is the share of the training that is over; 1, without help for the object, unless the
+        learner says otherwise.
+        """
         twin = twin_of(state)
-        task = self.task
+        task, progress = self.task, state.info["progress"]
         action = jnp.clip(action, -1.0, 1.0)
         frame, residual, targets = self.command(twin, action)
+        if self.assisted:
+            targets = jnp.concatenate([targets, self._assistance(twin, frame, progress)])
         physics = self.engine.step(twin.physics, targets)
         twin = Twin(physics=physics, demonstration=twin.demonstration, frame=frame, residual=residual)
 
@@ -138,7 +148,7 @@ class TrackingEnv(Env):
             "reward/rotation": jnp.exp(-task.rotation_sharpness * rotation),
             "reward/action": -task.action_cost * jnp.sum(action**2),
         }
-        done = jnp.maximum((position > task.lost_at).astype(jnp.float32), physics.unstable)
+        done = jnp.maximum((position > task.lost_distance(progress)).astype(jnp.float32), physics.unstable)
         finished = (frame >= self.reference.length[twin.demonstration] - 1).astype(jnp.float32)
         metrics = {**terms, "error/position": position, "error/rotation": rotation, "unstable": physics.unstable}
         info = {**state.info, "truncation": finished * (1 - done)}
@@ -161,6 +171,21 @@ class TrackingEnv(Env):
         target = self.reference.controls[twin.demonstration, frame] + residual
         return frame, residual, jnp.clip(target, self._low, self._high)
 
+    def _assistance(self, twin: Twin, frame: Int[Array, ""], progress: Float[Array, ""]) -> Float[Array, "6"]:
+        """The virtual object controller's force (N, world) and torque (N m, the object's axes)."""
+        stiffness = self.task.assist_stiffness(progress)
+        damping = 2 * jnp.sqrt(stiffness)
+        mass, inertia = self._inertia[twin.demonstration]
+        poses = self.reference.object_pose[twin.demonstration]
+        now, wanted = poses[twin.frame], poses[frame]
+        thing, speed = twin.physics.qpos[self.action_size :], twin.physics.qvel[self.action_size :]
+        moving = (wanted[:3] - now[:3]) * self.fps
+        turn = quaternion_difference(thing[3:], wanted[3:])
+        turning = quaternion_difference(now[3:], wanted[3:]) * self.fps
+        force = stiffness * (wanted[:3] - thing[:3]) + damping * (moving - speed[:3])
+        torque = stiffness * turn + damping * (turning - speed[3:])
+        return jnp.concatenate([mass * force, inertia * torque])
+
     def _observe(self, twin: Twin) -> Float[Array, "o"]:
         return observe(self.reference, self.task, twin.demonstration, twin.frame, twin.physics, twin.residual)
 
@@ -176,6 +201,7 @@ class TrackingEnv(Env):
         qpos, qvel, ctrl = assisted_replay(self.models, self.reference, self.task.substeps)
         count, frames = qpos.shape[:2]
         variant = np.repeat(np.arange(count, dtype=np.int32), frames)
+        ctrl = np.pad(ctrl, ((0, 0), (0, 0), (0, self.models[0].nu - self.action_size)))  # the object's motors rest
         rows = (variant, *(np.asarray(a, np.float32).reshape(count * frames, -1) for a in (qpos, qvel, ctrl)))
         table = jax.jit(lambda r: jax.lax.map(lambda row: self.engine.reset(*row), r, batch_size=1024))(rows)
         return jax.tree.map(lambda leaf: leaf.reshape(count, frames, *leaf.shape[1:]), table)

@@ -16,7 +16,7 @@ from brax.envs.base import State
 from brax.training import acting
 from brax.training.agents.ppo import losses, networks
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
-from jaxtyping import Array, Int, UInt
+from jaxtyping import Array, Float, Int, UInt
 
 from envs.parallel import ParallelEnv
 from mjx_hand.errors import InputError
@@ -67,9 +67,9 @@ class Learner:
         steps_per_update: control steps of all worlds together.
         template: shapes and types of a state.
         initial: the state from a seed, before any learning.
-        update: one unroll of every world and the gradient steps on it; also metrics, means over the update:
-            `training/...` of the learner, `episode/...` of the episodes that ended in it (sums over an episode; absent
-            where none ended). The state that goes in is given up.
+        update: one unroll of every world and the gradient steps on it, given the state and what share of the training
+            is over; also metrics, means over the update: `training/...` of the learner, `episode/...` of the episodes
+            that ended in it (sums over an episode; absent where none ended). The state that goes in is given up.
     """
 
     def __init__(self, env: ParallelEnv, ppo: Ppo):
@@ -108,8 +108,8 @@ class Learner:
             functools.partial(initial, reset=reset), out_shardings=self._shardings
         )
         update = functools.partial(_update, env=env, made=made, optimizer=optimizer, ppo=ppo, devices=len(devices))
-        self.update: Callable[[LearnerState], tuple[LearnerState, Mapping[str, Array]]] = jax.jit(
-            spread(update, in_specs=(specs,), out_specs=(specs, everywhere)),
+        self.update: Callable[[LearnerState, float], tuple[LearnerState, Mapping[str, Array]]] = jax.jit(
+            spread(update, in_specs=(specs, everywhere), out_specs=(specs, everywhere)),
             donate_argnums=0,
             out_shardings=(self._shardings, NamedSharding(self.mesh, everywhere)),
         )
@@ -133,6 +133,7 @@ def _check_split(ppo: Ppo, devices: int) -> None:
 
 def _update(
     state: LearnerState,
+    progress: Float[Array, ""],
     *,
     env: ParallelEnv,
     made: networks.PPONetworks,
@@ -146,9 +147,9 @@ def _update(
     acting_key, shuffle_key = jax.random.split(here)
 
     policy = networks.make_inference_fn(made)((None, state.params.policy, state.params.value))
-    worlds, data = acting.generate_unroll(
-        env, state.worlds, policy, acting_key, ppo.unroll_length, extra_fields=_EXTRAS
-    )
+    info = state.worlds.info
+    worlds = state.worlds.replace(info={**info, "progress": jnp.full_like(info["progress"], progress)})  # type: ignore[attr-defined]
+    worlds, data = acting.generate_unroll(env, worlds, policy, acting_key, ppo.unroll_length, extra_fields=_EXTRAS)
     data = jax.tree.map(lambda leaf: jnp.swapaxes(leaf, 0, 1), data)  # a row a world, so that minibatches are of rows
 
     gradient = jax.grad(

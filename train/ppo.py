@@ -140,7 +140,7 @@ class _Run:
                 if stopped:
                     self._save()
                     return stopped
-                self.state, metrics = self.learner.update(self.state)
+                self.state, metrics = self.learner.update(self.state, self.updates / self.last)
                 self.updates += 1
                 if time.monotonic() - logged > _LOG_SECONDS:
                     logged = time.monotonic()

@@ -45,7 +45,7 @@ def test_the_reward_is_the_papers(env, start, step, action):
 
 
 def test_the_residual_is_filtered_and_scaled_and_commanded(env, start, step, action):
-    scale = np.array([0.02] * 3 + [0.1] * 3 + [0.25] * 20)
+    scale = np.array([0.02] * 3 + [0.1] * 3 + [0.35] * 20)
     state, residual = at(start, 0, 100), np.zeros(26)
     for k in range(3):
         before = state

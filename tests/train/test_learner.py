@@ -34,7 +34,7 @@ def test_a_seed_is_a_state(learner: Learner):
 
 def test_an_update_changes_networks_moments_worlds_and_key(learner: Learner):
     before = jax.device_get(learner.initial(0))
-    after, metrics = learner.update(learner.initial(0))
+    after, metrics = learner.update(learner.initial(0), 0.0)
     changed = different(before, jax.device_get(after))
     for part in (".params.policy", ".params.value", ".optimizer", ".worlds.obs", ".key", ".updates"):
         assert any(name.startswith(part) for name in changed), part
@@ -46,15 +46,15 @@ def test_an_update_changes_networks_moments_worlds_and_key(learner: Learner):
 def test_it_compiles_once(learner: Learner):
     state = learner.initial(0)
     for _ in range(3):
-        state, _ = learner.update(state)
+        state, _ = learner.update(state, 0.0)
     assert learner.update._cache_size() == 1  # type: ignore[attr-defined]
 
 
 def test_a_state_that_was_put_away_goes_on_as_if_it_had_not_been(learner: Learner):
-    state, _ = learner.update(learner.initial(0))
+    state, _ = learner.update(learner.initial(0), 0.0)
     aside = jax.tree.map(np.array, jax.device_get(state))
-    on, _ = learner.update(state)
-    back, _ = learner.update(learner.placed(aside))
+    on, _ = learner.update(state, 0.0)
+    back, _ = learner.update(learner.placed(aside), 0.0)
     assert different(on, back) == []
 
 
@@ -63,7 +63,7 @@ def test_diverged_simulations_are_counted(tiny: Config, world: World):
     state = learner.initial(0)
     twin = twin_of(state.worlds)
     lost = replace(twin, residual=twin.residual.at[1, 7].set(jnp.nan))  # a finger is told to go nowhere
-    after, metrics = learner.update(replace(state, worlds=replace(state.worlds, pipeline_state=lost)))
+    after, metrics = learner.update(replace(state, worlds=replace(state.worlds, pipeline_state=lost)), 0.0)
     assert int(after.unstable) == 1
     assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(jax.device_get((after.params, after.worlds.obs))))
     assert float(metrics["episode/ended"]) >= 1

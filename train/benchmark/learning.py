@@ -49,13 +49,13 @@ def measure_learning(config: Config, world: World, alone: Contestant, runs: int,
     learner = Learner(ParallelEnv(world.env), dataclasses.replace(config.ppo, num_envs=alone.worlds))
     state = learner.initial(0)
     began = time.perf_counter()
-    state, _ = jax.block_until_ready(learner.update(state))
+    state, _ = jax.block_until_ready(learner.update(state, 0.0))
     first = time.perf_counter() - began
     steps = enough_steps(alone, seconds)
     trained, physics = [], []
     for _ in range(runs):
         began = time.perf_counter()
-        state, _ = jax.block_until_ready(learner.update(state))
+        state, _ = jax.block_until_ready(learner.update(state, 0.0))
         trained.append(learner.steps_per_update / (time.perf_counter() - began))
         physics.append(rate_once(alone, steps))
     rate = Rate.of(trained)
