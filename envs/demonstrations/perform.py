@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from mujoco import batch
 from scipy.spatial.transform import Rotation
 
-from envs.scene import NUM_WRIST, TIMESTEP
+from envs.scene import NUM_WRIST
 from mjx_hand.hand.joints import NUM_HINGES
 
 # What can come of a script; the first is success.
@@ -57,23 +57,40 @@ def perform(
         object_start: where each object stands.
         lifted_at: time (s) at which each lift ends.
     """
+    qpos, diverged = roll_out(models, controls, object_start)
+    return judge(qpos, diverged, bases, np.round(lifted_at / models[0].opt.timestep).astype(int))
+
+
+def roll_out(
+    models: Sequence[mujoco.MjModel], controls: Float[np.ndarray, "n t 26"], object_start: Float[np.ndarray, "n 7"]
+) -> tuple[Float[np.ndarray, "n t q"], Bool[np.ndarray, "n"]]:
+    """qpos after each physics step, and in which worlds the engine found a bad number; arguments as of `perform`."""
     count, steps = controls.shape[:2]
     worlds = batch.Batch(models[0], nsim=count)
     worlds.set_models(models)
     worlds.bind("qpos")[:] = np.concatenate([controls[:, 0], object_start], axis=1)
     qpos = worlds.rollout(steps, control=controls, record=("qpos",))["qpos"]
+    return qpos, worlds.warning[:, :, 1].any(axis=1)
 
+
+def judge(
+    qpos: Float[np.ndarray, "n t q"],
+    diverged: Bool[np.ndarray, "n"],
+    bases: Float[np.ndarray, "n 3 3"],
+    lifted: Int[np.ndarray, "n"],
+) -> Performance:
+    """What performances came to, of which the lifts end at the steps `lifted`; other arguments as of `roll_out`."""
+    count, steps = qpos.shape[:2]
     turns = Rotation.from_euler("XYZ", qpos[..., 3:NUM_WRIST].reshape(-1, 3)).as_matrix().reshape(count, steps, 3, 3)
     rotation = bases[:, None] @ turns
     position = np.einsum("nij,ntj->nti", bases, qpos[..., :3])
     pose = qpos[..., NUM_WRIST + NUM_HINGES :]
-    diverged = worlds.warning[:, :, 1].any(axis=1)
     return Performance(
         angles=qpos[..., NUM_WRIST : NUM_WRIST + NUM_HINGES],
         wrist_position=position,
         wrist_rotation=rotation,
         object_pose=pose,
-        outcome=_outcomes(rotation, position, pose, lifted_at, diverged),
+        outcome=_outcomes(rotation, position, pose, lifted, diverged),
     )
 
 
@@ -81,12 +98,11 @@ def _outcomes(
     rotation: Float[np.ndarray, "n t 3 3"],
     position: Float[np.ndarray, "n t 3"],
     pose: Float[np.ndarray, "n t 7"],
-    lifted_at: Float[np.ndarray, "n"],
+    lifted: Int[np.ndarray, "n"],
     diverged: Bool[np.ndarray, "n"],
 ) -> Int[np.ndarray, "n"]:
-    """See `Performance.outcome`."""
+    """See `Performance.outcome`; `lifted` are the steps at which the lifts end."""
     rows = np.arange(len(pose))
-    lifted = np.round(lifted_at / TIMESTEP).astype(int)
     rose = pose[:, -1, 2] - pose[:, 0, 2] > _RISE
     in_hand = np.einsum("ntji,ntj->nti", rotation, pose[..., :3] - position)
     slip = np.linalg.norm(in_hand[:, -1] - in_hand[rows, lifted], axis=-1)

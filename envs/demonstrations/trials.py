@@ -46,6 +46,27 @@ class Trial:
     object_pose: Float[np.ndarray, "t 7"]
 
 
+@dataclasses.dataclass(frozen=True)
+class Script:
+    """A grasp to perform; metres, radians, wxyz.
+
+    Attributes:
+        hand: index of the hand that does it, among those that scripts were drawn for.
+        object: what is grasped.
+        object_start: where it stands.
+        motion: what the hand is told.
+        base: world_from_base of the scene's wrist.
+        model: the scene.
+    """
+
+    hand: int
+    object: ObjectDescription
+    object_start: Float[np.ndarray, "7"]
+    motion: GraspMotion
+    base: Float[np.ndarray, "3 3"]
+    model: mujoco.MjModel
+
+
 def perform_trials(
     grasp: GraspType,
     hands: Sequence[RigidHand],
@@ -104,33 +125,47 @@ def _attempt(
     grasp: GraspType, hands: Sequence[RigidHand], people: Sequence[int], rng: np.random.Generator
 ) -> tuple[list[Trial], list[str]]:
     """One batch of random trials: those that held, and what came of each."""
+    scripts = draw_scripts(grasp, hands, rng)
+    unsolved = [NO_POSTURE] * (len(hands) - len(scripts))
+    if not scripts:
+        return [], unsolved
+    models = gauss_seidel([script.model for script in scripts])
+    done = perform(
+        models,
+        np.stack([script.base for script in scripts]),
+        script_controls(scripts, models[0]),
+        np.stack([script.object_start for script in scripts]),
+        np.array([script.motion.tempo.end("lift") for script in scripts]),
+    )
+    held = [_trial(done, row, people[s.hand], s) for row, s in enumerate(scripts) if done.held[row]]
+    return held, unsolved + [OUTCOMES[k] for k in done.outcome]
+
+
+def draw_scripts(grasp: GraspType, hands: Sequence[RigidHand], rng: np.random.Generator) -> list[Script]:
+    """A random grasp of each hand, less those for whose object no posture is found."""
     things = [_draw_object(grasp, rng) for _ in hands]
     solved = solve_postures(grasp, hands, np.stack([thing.size for thing in things]))
     postures = [jax.tree.map(lambda leaf, k=k: np.asarray(leaf[k], float), solved) for k in range(len(hands))]
-    good = [k for k, posture in enumerate(postures) if posture.touch_error < _TOUCH_LIMIT]
-    unsolved = [NO_POSTURE] * (len(hands) - len(good))
-    if not good:
-        return [], unsolved
     gains = Gains()
-    motions, models, starts = [], [], []
     lying = np.array(grasp.object_rotation)
     upright = Rotation.from_matrix(lying).as_quat(scalar_first=True)
-    for k in good:
-        reach = np.abs(lying[2]) @ np.asarray(half_extents(things[k].kind, jnp.asarray(things[k].size)))
+    scripts = []
+    for k, (hand, thing, posture) in enumerate(zip(hands, things, postures, strict=True)):
+        if posture.touch_error >= _TOUCH_LIMIT:
+            continue
+        reach = np.abs(lying[2]) @ np.asarray(half_extents(thing.kind, jnp.asarray(thing.size)))
         centre = np.array([0.0, 0.0, grasp.rest + reach])
-        starts.append(np.concatenate([centre, upright]))
-        motions.append(_draw_motion(grasp, postures[k], centre, hands[k], gains, rng))
-        models.append(scene_model(hands[k], things[k], *support_boxes(grasp), postures[k].rotation, gains=gains))
-    bases = np.stack([postures[k].rotation for k in good])
-    done = perform(
-        gauss_seidel(models),
-        bases,
-        _controls(motions, bases, models[0]),
-        np.stack(starts),
-        np.array([motion.tempo.end("lift") for motion in motions]),
-    )
-    held = [_trial(done, row, people[k], things[k], motions[row].tempo) for row, k in enumerate(good) if done.held[row]]
-    return held, unsolved + [OUTCOMES[k] for k in done.outcome]
+        scripts.append(
+            Script(
+                hand=k,
+                object=thing,
+                object_start=np.concatenate([centre, upright]),
+                motion=_draw_motion(grasp, posture, centre, hand, gains, rng),
+                base=posture.rotation,
+                model=scene_model(hand, thing, *support_boxes(grasp), posture.rotation, gains=gains),
+            )
+        )
+    return scripts
 
 
 def support_boxes(grasp: GraspType) -> tuple[Float[np.ndarray, "b 3"], Float[np.ndarray, "b 3"]]:
@@ -139,11 +174,11 @@ def support_boxes(grasp: GraspType) -> tuple[Float[np.ndarray, "b 3"], Float[np.
     return np.array(halves).reshape(-1, 3), np.array(centres).reshape(-1, 3)
 
 
-def _trial(done: Performance, row: int, person: int, thing: ObjectDescription, tempo: Tempo) -> Trial:
-    steps = round(tempo.duration / TIMESTEP)
+def _trial(done: Performance, row: int, person: int, script: Script) -> Trial:
+    steps = round(script.motion.tempo.duration / TIMESTEP)
     return Trial(
         person=person,
-        object=thing,
+        object=script.object,
         angles=done.angles[row, :steps],
         wrist_position=done.wrist_position[row, :steps],
         wrist_rotation=done.wrist_rotation[row, :steps],
@@ -187,14 +222,13 @@ def _draw_motion(
     )
 
 
-def _controls(
-    motions: Sequence[GraspMotion], bases: Float[np.ndarray, "n 3 3"], model: mujoco.MjModel
-) -> Float[np.ndarray, "n t 26"]:
-    """Targets at the physics rate, all as long as the longest script (the shorter ones hold their last)."""
-    time = np.arange(round(max(motion.tempo.duration for motion in motions) / TIMESTEP)) * TIMESTEP
+def script_controls(scripts: Sequence[Script], model: mujoco.MjModel) -> Float[np.ndarray, "n t 26"]:
+    """Targets at the model's physics rate, all as long as the longest script (the shorter ones hold their last)."""
+    step = model.opt.timestep
+    time = np.arange(round(max(script.motion.tempo.duration for script in scripts) / step)) * step
     rows = []
-    for motion, base in zip(motions, bases, strict=True):
-        angles, position, quaternion = scripted_targets(motion, time)
-        rows.append(np.concatenate([wrist_coordinates(position, quaternion, base), angles], axis=1))
+    for script in scripts:
+        angles, position, quaternion = scripted_targets(script.motion, time)
+        rows.append(np.concatenate([wrist_coordinates(position, quaternion, script.base), angles], axis=1))
     low, high = model.actuator_ctrlrange.T
     return np.clip(np.stack(rows), low, high)

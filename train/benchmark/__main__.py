@@ -1,4 +1,4 @@
-"""`python -m train.benchmark [engines|keypoints|retarget]`: what this machine does; all where none is named."""
+"""`python -m train.benchmark [engines|keypoints|retarget|solver]`: what this machine does; all where none is named."""
 
 import sys
 from collections.abc import Sequence
@@ -8,9 +8,9 @@ import tyro
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 from mjx_hand.motion.archive import replacing
-from train.benchmark import engines, keypoints, retarget
+from train.benchmark import engines, keypoints, retarget, solver
 
-MODULES = {"engines": engines, "keypoints": keypoints, "retarget": retarget}
+MODULES = {"engines": engines, "keypoints": keypoints, "retarget": retarget, "solver": solver}
 
 
 def main(argv: Sequence[str] | None = None) -> int:

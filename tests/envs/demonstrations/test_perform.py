@@ -2,7 +2,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.perform import OUTCOMES, _outcomes
-from envs.scene import TIMESTEP
 
 LIFTED = 50
 
@@ -23,6 +22,6 @@ def test_each_way_to_fail_is_told_by_its_name():
     takes = [take(), take(), take(rise=0.03), take(shift=0.02), take(turn=0.4), take(shift=0.008, turn=0.2)]
     rotation, position, pose = (np.stack(parts) for parts in zip(*takes, strict=True))
     diverged = np.array([False, True, False, False, False, False])
-    lifted_at = np.full(len(takes), LIFTED * TIMESTEP)
-    found = [OUTCOMES[k] for k in _outcomes(rotation, position, pose, lifted_at, diverged)]
+    lifted = np.full(len(takes), LIFTED)
+    found = [OUTCOMES[k] for k in _outcomes(rotation, position, pose, lifted, diverged)]
     assert found == ["held", "diverged", "not lifted", "slipped", "turned in the hand", "held"]
