@@ -1,8 +1,10 @@
 """`build_rigid_hand`: a skinned hand of a given shape, made rigid."""
 
+import functools
+
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
 from mjx_hand.errors import InputError
@@ -13,7 +15,7 @@ from mjx_hand.rigid.axes import AXES
 from mjx_hand.rigid.collision import palm_capsules, phalanx_capsules, skin_samples
 from mjx_hand.rigid.face_links import face_links
 from mjx_hand.rigid.limits import active_limits, anatomical_limits
-from mjx_hand.rigid.pieces import close
+from mjx_hand.rigid.pieces import Piece, close
 from mjx_hand.rigid.rigid_hand import RigidHand
 from mjx_hand.rigid.segments import cut, mass_properties
 
@@ -42,15 +44,14 @@ def build_rigid_hand(hand: HandModel, shape: ArrayLike | None = None, axes: str 
     solids = [segment.solid for segment in parts.segments]
     properties = [mass_properties(solid.vertices(divided), solid.faces) for solid in solids]
     mass = np.array([p[0] for p in properties])
-    whole = close(np.asarray(hand.faces))
+    whole = _whole(hand)
     total = mass_properties(whole.vertices(rest), whole.faces)[0]
     if mass.min() <= 0 or total <= 0:
         raise InputError(f"shape {np.round(coefficients, 2).tolist()} turns the hand inside out; stay within +-5")
     scale = total / mass.sum()  # flat caps may overlap a little where three segments meet
 
     surfaces = [segment.surface(divided, centres) for segment in parts.segments]
-    owners = face_links(hand)
-    samples = [skin_samples(rest, np.asarray(hand.faces)[owners == link]) for link in range(NUM_LINKS)]
+    samples = [skin_samples(rest, faces) for faces in _skin(hand)]
     points, areas = [s[0] for s in samples], [s[1] for s in samples]
     palm_ends, palm_radii = palm_capsules(points[0], areas[0], centres)
     finger_ends, finger_radii = phalanx_capsules(points, areas, centres, tips)
@@ -77,6 +78,20 @@ def build_rigid_hand(hand: HandModel, shape: ArrayLike | None = None, axes: str 
         side=hand.side,
         name=hand.name,
     )
+
+
+# What follows from a hand's faces alone, kept as `cut` keeps its own: by the hand's identity.
+@functools.lru_cache(maxsize=4)
+def _whole(hand: HandModel) -> Piece:
+    """The whole skin, closed."""
+    return close(np.asarray(hand.faces))
+
+
+@functools.lru_cache(maxsize=4)
+def _skin(hand: HandModel) -> tuple[Int[np.ndarray, "_ 3"], ...]:
+    """Each link's whole triangles."""
+    owners = face_links(hand)
+    return tuple(np.asarray(hand.faces)[owners == link] for link in range(NUM_LINKS))
 
 
 def _checked_shape(hand: HandModel, shape: ArrayLike | None) -> Float[np.ndarray, "s"]:
