@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from envs.demonstrations.dataset import set_folder
+from envs.demonstrations.dataset import set_folder, told_apart_by
 from envs.evaluation import Evaluation
 from envs.grasps import grasp_names, grasp_type
 from envs.type_table import type_scores
@@ -86,7 +86,8 @@ def made_of(configs: Sequence[Config]) -> str:
     """A digest of all that an evaluation depends on: settings, demonstrations, policies and the version."""
     content = hashlib.sha256(version("mjx-hand").encode())
     for config in configs:
-        parts = [dataclasses.asdict(part) for part in (config.data, config.task, config.ppo, config.checks)]
+        parts = [told_apart_by(config.data)]
+        parts += [dataclasses.asdict(part) for part in (config.task, config.ppo, config.checks)]
         sets = [set_folder(settings, config.demonstrations).name for settings in config.data.of_each_type()]
         forces = [grasp_type(name).grip_force for name in grasp_names()]
         told = [config.name, config.engine, config.seed, sets, forces, parts]

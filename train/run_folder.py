@@ -66,8 +66,8 @@ class RunFolder:
         save_run(self._states, steps, state, notes)
 
     def _check_same(self, config: Config, written: Path) -> None:
-        plain = json.loads(json.dumps(dataclasses.asdict(config)))  # lists for tuples, as the file has them
-        before, now = _settings(_read(written)), _settings(plain)
+        # An option that there was not yet when the folder was written had what is now its default.
+        before, now = _settings(_plain(Config())) | _settings(_read(written)), _settings(_plain(config))
         differing = [name for name in sorted(before.keys() | now.keys()) if before.get(name) != now.get(name)]
         if differing:
             name = differing[0]
@@ -76,6 +76,10 @@ class RunFolder:
                 f"{self.path} holds a training with {name}={before.get(name)}, now {now.get(name)}{others}; "
                 "choose another folder with out=FOLDER, or train anew in this one with fresh=true"
             )
+
+
+def _plain(config: Config) -> dict[str, Any]:
+    return json.loads(json.dumps(dataclasses.asdict(config)))  # lists for tuples, as the file has them
 
 
 def _read(path: Path) -> dict[str, Any]:

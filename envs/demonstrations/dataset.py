@@ -13,10 +13,11 @@ import shutil
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from envs.demonstrations.record import CaptureSettings, record_trials, save_truth
+from envs.demonstrations.record import CaptureSettings, project_recording, record_trials, save_truth
 from envs.demonstrations.recorded import RECORDED, read_demonstration
 from envs.demonstrations.trials import perform_trials
 from envs.demonstrations.variations import RecordingSettings, vary
@@ -25,8 +26,11 @@ from mjx_hand.capture.datasets.dexmv_object import recording_files
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion.demonstration import Demonstration, load_demonstration, save_demonstration
-from mjx_hand.motion.motion import save_motion
+from mjx_hand.motion.motion import load_motion_file, save_motion
+from mjx_hand.pytree import replace
+from mjx_hand.retarget.hands import KinematicHands
 from mjx_hand.rigid.build import build_rigid_hand
+from mjx_hand.rigid.own_hinges import with_hinges_of
 from mjx_hand.rigid.rigid_hand import RigidHand
 
 PARTS = ("train", "heldout")
@@ -34,7 +38,7 @@ ALL = "all"
 YIELD = "yield.json"
 AS_RECORDED, VARIED = "as recorded", "varied"  # what a set from a recording counts
 _VERSION = 3  # of the generator: a change that makes other demonstrations of the same settings raises it
-_RECORDED_VERSION = 2  # the same of what is made of a recording
+_RECORDED_VERSION = 3  # the same of what is made of a recording
 _APART = 1_000_003  # between the seeds of the parts
 _SHAPE_LIMIT = 2.0  # standard deviations
 
@@ -85,7 +89,7 @@ class SetSettings:
 
 def set_folder(settings: SetSettings, root: str | Path) -> Path:
     """Where a set of these settings lives below `root`: its name carries a digest of all settings and of the type."""
-    made_of = [_VERSION, dataclasses.asdict(settings)]
+    made_of: list[Any] = [_VERSION, told_apart_by(settings)]
     recording = made_of[1].pop("recording")
     if settings.grasp == RECORDED:
         files = _recording_files(settings.recording)
@@ -101,6 +105,11 @@ def set_folder(settings: SetSettings, root: str | Path) -> Path:
         made_of.append(grasp)
     content = json.dumps(made_of, sort_keys=True)
     return Path(root) / f"{settings.grasp}-{hashlib.sha256(content.encode()).hexdigest()[:10]}"
+
+
+def told_apart_by(settings: SetSettings) -> dict[str, Any]:
+    """All settings that tell sets apart, as in `CaptureSettings.told_apart_by`."""
+    return dataclasses.asdict(settings) | {"capture": settings.capture.told_apart_by()}
 
 
 def make_set(settings: SetSettings, root: str | Path, report: Report = lambda what, share: None) -> Path:
@@ -120,6 +129,8 @@ def make_set(settings: SetSettings, root: str | Path, report: Report = lambda wh
     try:
         if settings.grasp == RECORDED:
             yields = _make_variations(settings, temporary, report)
+        elif (usual := dataclasses.replace(settings, capture=settings.capture.projected_as_usual())) != settings:
+            yields = _project_again(settings, make_set(usual, root, report), temporary, report)
         else:
             parts = dict(zip(PARTS, (settings.people, settings.heldout_people), strict=True))
             yields = {
@@ -170,6 +181,22 @@ def _make_part(
     return tally
 
 
+def _project_again(settings: SetSettings, usual: Path, folder: Path, report: Report) -> Mapping[str, Mapping[str, int]]:
+    """Make both parts from the fitted motions of a set, with another projection; what came of that set's attempts."""
+    hands, what = KinematicHands(axes=settings.capture.axes), f"projecting {settings.grasp} recordings"
+    paths = [path for part in PARTS for path in _demonstration_files(usual, part)]
+    for k, path in enumerate(paths):
+        report(what, k / len(paths))
+        demonstration, motion = load_demonstration(path), load_motion_file(path.with_suffix(".motion.npz"))
+        joints, hinges = project_recording(motion, settings.capture, hands)
+        there = folder / path.parent.name
+        there.mkdir(exist_ok=True)
+        for kept in (".motion.npz", ".truth.npz"):
+            shutil.copyfile(path.with_suffix(kept), there / (path.stem + kept))
+        save_demonstration(replace(demonstration, motion=joints, **hinges), there / path.name)
+    return json.loads((usual / YIELD).read_text())
+
+
 def _make_variations(settings: SetSettings, folder: Path, report: Report) -> Mapping[str, Mapping[str, int]]:
     """Make both parts from a recording; what they hold."""
     given, made = settings.recording, 0
@@ -208,15 +235,19 @@ def load_part(folder: str | Path, part: str) -> list[Demonstration]:
     """
     if part not in PARTS:
         raise InputError(f"part {part!r} is not known; valid: {', '.join(PARTS)}")
+    return [load_demonstration(path) for path in _demonstration_files(folder, part)]
+
+
+def _demonstration_files(folder: str | Path, part: str) -> list[Path]:
     paths = [p for p in sorted(Path(folder, part).glob("*.npz")) if p.stem.isdigit()]
     if not paths:
         raise InputError(f"{folder}: no {part} demonstrations; delete the folder and run again to make the set anew")
-    return [load_demonstration(path) for path in paths]
+    return paths
 
 
 def twins(demonstrations: Sequence[Demonstration]) -> list[RigidHand]:
-    """The twin's hand for each demonstration, from the shape that was fitted to the person."""
+    """The twin's hand for each demonstration, from the shape that was fitted to the person, with its own hinges."""
     model = load_hand(side=demonstrations[0].motion.side)
     made = {d.shape.tobytes(): d.shape for d in demonstrations}
     hands = {key: build_rigid_hand(model, shape) for key, shape in made.items()}
-    return [hands[d.shape.tobytes()] for d in demonstrations]
+    return [with_hinges_of(d, hands[d.shape.tobytes()]) for d in demonstrations]

@@ -7,7 +7,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -25,15 +25,18 @@ from mjx_hand.errors import InputError
 from mjx_hand.hand.model import HandModel
 from mjx_hand.motion.archive import load_arrays, save_arrays
 from mjx_hand.motion.demonstration import Demonstration
+from mjx_hand.motion.joint_motion import JointMotion
 from mjx_hand.motion.motion import Motion
 from mjx_hand.motion.resample import matrix_quaternions, resample_motion
 from mjx_hand.motion.smooth import CUTOFF, low_pass, smooth_rows
 from mjx_hand.pytree import replace
+from mjx_hand.retarget.hands import KinematicHands
+from mjx_hand.retarget.options import RetargetOptions
 from mjx_hand.retarget.sequence import retarget_sequence
-from mjx_hand.rigid.build import build_rigid_hand
 from mjx_hand.rigid.rigid_hand import RigidHand, joint_rotations
 
 TRUTH_SCHEMA = "mjx-hand/truth/1"
+_PROJECTION = ("method", "axes", "refine")  # settings that concern the twin, not the recording
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,6 +52,8 @@ class CaptureSettings:
             rad.
         rate: of the demonstrations made from the recordings, 1/s.
         cutoff: of the low-pass filter on their angles and poses, Hz.
+        method, refine: how rotations become hinge angles, as in `RetargetOptions`.
+        axes: of the twin's hinges: "anatomical", or "functional", fitted to each recording.
     """
 
     fps: float = 120.0
@@ -58,6 +63,9 @@ class CaptureSettings:
     object_noise: float = 0.0002
     rate: float = 50.0
     cutoff: float = CUTOFF
+    method: str = "exact"
+    axes: str = "anatomical"
+    refine: str = "none"
 
     def __post_init__(self):
         for name in ("fps", "rate", "cutoff"):
@@ -72,6 +80,22 @@ class CaptureSettings:
             raise InputError(
                 f"data.capture.cutoff is {self.cutoff} Hz; it must be below half of data.capture.rate ({self.rate} Hz)"
             )
+        RetargetOptions(method=self.method, refine=self.refine)
+        KinematicHands(axes=self.axes)
+
+    def projected_as_usual(self) -> "CaptureSettings":
+        """The same recordings with the projection that there is unless another is asked for."""
+        usual = {field.name: field.default for field in dataclasses.fields(self) if field.name in _PROJECTION}
+        return dataclasses.replace(self, **usual)
+
+    def told_apart_by(self) -> dict[str, Any]:
+        """What tells recordings apart: all settings, the projection's only where they are not the usual ones.
+
+        There was one projection first, and sets from then keep their names.
+        """
+        usual = self.projected_as_usual()
+        settings = dataclasses.asdict(self)
+        return {n: v for n, v in settings.items() if n not in _PROJECTION or v != getattr(usual, n)}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -115,7 +139,7 @@ def record_trials(
     Args:
         trials: what was performed.
         hands, shapes: the true hand and its shape coefficients, by person.
-        model: the hand model that both the people and the fit use.
+        model: the hand model that both the people and the fit use; the open hand, of which twins are made.
         grasp: their type.
         seed: of noise, gaps and off-axis rotations.
         settings: of the capture system.
@@ -140,10 +164,10 @@ def record_trials(
         )
     out = []
     support, support_position = support_boxes(grasp)
+    twins = KinematicHands(axes=settings.axes)
     for k, (motion, _) in enumerate(fit_many(recordings, model, markers, progress=progress)):
         trial, fitted = trials[k], resample_motion(motion, settings.rate)
-        twin = build_rigid_hand(model, fitted.shape)
-        joints = low_pass(retarget_sequence(fitted, twin), settings.cutoff)
+        joints, hinges = project_recording(fitted, settings, twins)
         truth = _truth(trial, shapes[trial.person], joints.num_frames, settings.rate)
         source = f"simulated {grasp.name}, person {trial.person}, seed {seed}.{k}"
         demonstration = Demonstration(
@@ -155,9 +179,27 @@ def record_trials(
             shape=fitted.shape,
             grasp=grasp.name,
             source=source,
+            **hinges,
         )
         out.append(Recorded(replace(fitted, source=source), demonstration, truth))
     return out
+
+
+def project_recording(
+    fitted: Motion, settings: CaptureSettings, twins: KinematicHands
+) -> tuple[JointMotion, dict[str, Any]]:
+    """A fitted motion on the twin's hinges, filtered; and `Demonstration`'s description of them, if they are its own.
+
+    Args:
+        fitted: at the demonstration's rate.
+        settings: of projection and filter.
+        twins: makes the hand, with the axes of the settings.
+    """
+    twin = twins.of(fitted)
+    joints = retarget_sequence(fitted, twin, settings.method, refine=settings.refine)
+    own = settings.axes != settings.projected_as_usual().axes
+    hinges = {"hinge_axis": twin.hinge_axis, "rest_rotation": twin.rest_rotation} if own else {}
+    return low_pass(joints, settings.cutoff), hinges
 
 
 def _true_rotations(trials: Sequence[Trial], hands: Sequence[RigidHand]) -> list[Float[np.ndarray, "t 15 3 3"]]:

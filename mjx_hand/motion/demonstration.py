@@ -24,6 +24,7 @@ _LAYOUT: dict[str, tuple[int | str, ...]] = {
     "support_position": ("b", 3),
     "shape": ("s",),
 }
+_HINGES: dict[str, tuple[int | str, ...]] = {"hinge_axis": (20, 3), "rest_rotation": (15, 3, 3)}
 
 
 @pytree
@@ -59,6 +60,8 @@ class Demonstration:
         support: half extents of the boxes that hold the object up at first, if it does not stand on the table.
         support_position: centres of those boxes.
         shape: MANO shape coefficients of the person, from which the twin's hand is built.
+        hinge_axis, rest_rotation: of the twin's hinges, as in `RigidHand`, where the angles belong to others than those
+            that the shape's hand is built with; else None.
         grasp: name of the grasp type.
         source: provenance, one line.
     """
@@ -69,6 +72,8 @@ class Demonstration:
     support: Float[np.ndarray, "b 3"]
     support_position: Float[np.ndarray, "b 3"]
     shape: Float[np.ndarray, "s"]
+    hinge_axis: Float[np.ndarray, "20 3"] | None = None
+    rest_rotation: Float[np.ndarray, "15 3 3"] | None = None
     grasp: str = static()
     source: str = static(default="")
 
@@ -80,6 +85,7 @@ class Demonstration:
 def save_demonstration(demonstration: Demonstration, path: str | Path) -> None:
     """Write as `.npz` (schema mjx-hand/demonstration/2)."""
     d, m = demonstration, demonstration.motion
+    hinges = {name: value for name in _HINGES if (value := getattr(d, name)) is not None}
     save_arrays(
         path,
         SCHEMA,
@@ -102,6 +108,7 @@ def save_demonstration(demonstration: Demonstration, path: str | Path) -> None:
             "shape": d.shape,
             "grasp": d.grasp,
             "source": d.source,
+            **hinges,
         },
     )
 
@@ -115,7 +122,8 @@ def load_demonstration(path: str | Path) -> Demonstration:
     a = load_arrays(path, SCHEMA)
     source = text(path, a, "source")
     motion = joint_motion_of(path, a, source)
-    n = numbers(path, a, _LAYOUT | {"object_pose": (motion.num_frames, 7)})
+    hinges = {name: shape for name, shape in _HINGES.items() if name in a}
+    n = numbers(path, a, _LAYOUT | hinges | {"object_pose": (motion.num_frames, 7)})
     kind = text(path, a, "object_kind")
     if kind not in OBJECT_KINDS:
         raise InputError(f"{path}: object_kind is {kind!r}; known: {', '.join(OBJECT_KINDS)}")
@@ -136,6 +144,8 @@ def load_demonstration(path: str | Path) -> Demonstration:
         support=n["support"],
         support_position=n["support_position"],
         shape=n["shape"],
+        hinge_axis=n.get("hinge_axis"),
+        rest_rotation=n.get("rest_rotation"),
         grasp=text(path, a, "grasp"),
         source=source,
     )

@@ -12,6 +12,7 @@ from mjx_hand.motion import Demonstration, JointMotion, Motion
 from mjx_hand.pytree import replace
 from mjx_hand.retarget.sequence import retarget_errors, retarget_sequence, rigid_hand_of
 from mjx_hand.rigid.build import build_rigid_hand
+from mjx_hand.rigid.own_hinges import with_hinges_of
 from mjx_hand.view.hand_scene import object_layers, skin_layer, skin_vertices, skinned_motion, twin_layer
 from mjx_hand.view.scene import Colour, Curve, Layer, PointLayer, Scene, SkinLayer
 
@@ -40,7 +41,7 @@ def joint_motion_scene(motion: JointMotion, hand: HandModel, up: str = "+z") -> 
 
 def demonstration_scene(demonstration: Demonstration, hand: HandModel) -> Scene:
     """The twin and the object of a demonstration, above its table."""
-    rigid = build_rigid_hand(hand, demonstration.shape)
+    rigid = with_hinges_of(demonstration, build_rigid_hand(hand, demonstration.shape))
     motion = demonstration.motion
     skin = skin_layer(skinned_motion(motion, demonstration.shape, rigid), hand)
     layers = (skin, twin_layer(motion, rigid, shown=False), *object_layers(demonstration))
