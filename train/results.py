@@ -10,7 +10,7 @@ the same command goes on where it was stopped.
 
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from mjx_hand.compile_cache import enable_compile_cache
@@ -62,20 +62,39 @@ def plan(argv: Sequence[str]) -> tuple[list[list[Config]], Path]:
     Raises:
         InputError: what cannot be used, before anything is trained.
     """
-    own = {key: value for key, _, value in (a.partition("=") for a in argv) if key in ("names", "results")}
-    overrides = [a for a in argv if a.partition("=")[0] not in own]
-    if any(a.startswith("config=") for a in overrides):
-        raise InputError("experiments are chosen with names=[...] here, such as names=[pinch]; leave out config=")
+    own, overrides = taken(argv, ("names", "results"))
     if not any(a.startswith(("seed=", "seeds=")) for a in overrides):
         overrides.append(SEEDS)
-    names = [name.strip() for name in own["names"].strip("[]").split(",")] if "names" in own else list(FIVE)
-    if not all(names):
-        raise InputError(f"names={own['names']} names no experiment; give for example names=[{','.join(FIVE)}]")
-    experiments = [compose_seeds([f"config={name}", *overrides]) for name in dict.fromkeys(names)]
+    experiments = [compose_seeds([f"config={name}", *overrides]) for name in listed(own, "names", FIVE)]
     folders = [shared_folder(configs) for configs in experiments]
     if len(set(folders)) < len(folders):
         raise InputError(f"out puts several experiments into {folders[0]}; put ${{name}} into it")
     return experiments, Path(own.get("results") or FOLDER)
+
+
+def taken(argv: Sequence[str], keys: Sequence[str]) -> tuple[dict[str, str], list[str]]:
+    """The arguments of these keys, which are the command's own, and the others, which are overrides.
+
+    Raises:
+        InputError: an override that chooses the experiment.
+    """
+    own = {key: value for key, _, value in (a.partition("=") for a in argv) if key in keys}
+    overrides = [a for a in argv if a.partition("=")[0] not in own]
+    if any(a.startswith("config=") for a in overrides):
+        raise InputError("experiments are chosen with names=[...] here, such as names=[pinch]; leave out config=")
+    return own, overrides
+
+
+def listed(own: Mapping[str, str], key: str, otherwise: Sequence[str]) -> list[str]:
+    """The names of an argument such as names=[power,pinch], each once; `otherwise` where it is not given.
+
+    Raises:
+        InputError: it names nothing.
+    """
+    names = [name.strip(" '\"") for name in own[key].strip("[]").split(",")] if key in own else list(otherwise)
+    if not all(names):
+        raise InputError(f"{key}={own[key]} names nothing; give for example {key}=[{','.join(otherwise)}]")
+    return list(dict.fromkeys(names))
 
 
 def measure(configs: Sequence[Config]) -> Experiment:

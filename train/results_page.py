@@ -19,7 +19,7 @@ from train.results_table import Experiment, failures_table, minutes_of, results_
 from train.seeds import POLICY
 
 SCHEMA = "mjx-hand/results/1"
-_PACKAGES = ("mjx-hand", "mujoco", "mujoco-mjx", "jax", "brax")
+PACKAGES = ("mjx-hand", "mujoco", "mujoco-mjx", "jax", "brax")
 _TASK = (
     "Policies that replay human demonstrations in physics: reach, grasp, lift, carry, turn and hold, on demonstrations "
     "by people and with objects that training has not seen."
@@ -52,7 +52,7 @@ def write_results_page(experiments: Sequence[Experiment], waiting: Sequence[str]
 def _page(experiments: Sequence[Experiment], waiting: Sequence[str], command: str) -> Report:
     table, failures = results_table(experiments), failures_table(experiments)
     last = dict(zip(table.columns, table.rows[-1], strict=True))
-    hardware, packages = machine(*_PACKAGES)
+    hardware, packages = machine(*PACKAGES)
     return Report(
         title="mjx-hand: results",
         task=_TASK + (f" Not done yet: {', '.join(waiting)}." if waiting else ""),
@@ -125,12 +125,12 @@ def _beside(paper: str) -> str:
 
 def _markdown(experiments: Sequence[Experiment], waiting: Sequence[str], folder: Path, command: str) -> str:
     table, failures = results_table(experiments), failures_table(experiments)
-    lines = ["# Results", "", _TASK, "", *_rows(table), "", table.note, ""]
+    lines = ["# Results", "", _TASK, "", *markdown_rows(table), "", table.note, ""]
     if waiting:
         lines += [f"Not done yet: {', '.join(waiting)}.", ""]
-    lines += ["## How failures failed", "", *_rows(_shares(experiments)), ""]
+    lines += ["## How failures failed", "", *markdown_rows(_shares(experiments)), ""]
     if failures.rows:
-        lines += ["## Failures", "", *_rows(failures), ""]
+        lines += ["## Failures", "", *markdown_rows(failures), ""]
     lines += ["## More", ""]
     for experiment in experiments:
         where = Path(os.path.relpath(experiment.folder, folder)).as_posix()
@@ -139,11 +139,13 @@ def _markdown(experiments: Sequence[Experiment], waiting: Sequence[str], folder:
             f"[{name}]({where}/{note['file']})" for name, note in experiment.summary["films"].items() if note["file"]
         ]
         lines.append(f"- {experiment.name}: {', '.join(links)}; {_made_with(experiment)}")
-    lines += ["", *(f"- {line}" for line in machine(*_PACKAGES)), "", f"    {command}"]
+    lines += ["", *(f"- {line}" for line in machine(*PACKAGES)), "", f"    {command}"]
     return "\n".join(lines) + "\n"
 
 
-def _rows(table: Table) -> list[str]:
+def markdown_rows(table: Table) -> list[str]:
+    """A table as lines of Markdown."""
+
     def line(cells: Sequence[str]) -> str:
         return f"| {' | '.join(cell or '–' for cell in cells)} |"
 
@@ -166,7 +168,7 @@ def _json(experiments: Sequence[Experiment]) -> dict[str, object]:
         }
     return {
         "schema": SCHEMA,
-        "machine": machine(*_PACKAGES),
+        "machine": machine(*PACKAGES),
         "paper": {name: dataclasses.asdict(row) for name, row in PAPER.items()},
         "table": {"columns": list(table.columns), "rows": [list(row) for row in table.rows]},
         "experiments": content,

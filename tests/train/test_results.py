@@ -173,7 +173,7 @@ def test_the_plan_takes_names_seeds_and_overrides():
     ("argument", "said"),
     [
         ("config=pinch", "names=[...] here"),
-        ("names=[]", "names no experiment"),
+        ("names=[]", "names nothing; give for example names=[power,pinch,"),
         ("names=[pich]", "pich"),
         ("ppo.num_env=8", "did you mean ppo.num_envs?"),
         ("out=here/seed${seed}", "several experiments into here"),
