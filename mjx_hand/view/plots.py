@@ -203,33 +203,47 @@ def retarget_errors(errors: Mapping[str, Float[Array, "_"]], *, label: str = "er
 
 
 @mpl.rc_context(STYLE)
-def throughput(rates: Mapping[str, Float[Array, "k 4"]], *, label: str) -> Figure:
-    """How fast each contestant is over its number of worlds, on logarithmic axes.
+def throughput(panels: Mapping[str, Mapping[str, Float[Array, "k 4"]]], *, label: str) -> Figure:
+    """How fast each contestant is over its number of worlds: a panel a scene, on the same logarithmic axes.
 
     Args:
-        rates: name to rows of the number of worlds and the median, least and greatest rate.
-        label: of the vertical axis.
+        panels: scene to name to rows of the number of worlds and the median, least and greatest rate.
+        label: of the vertical axes.
 
     Raises:
         InputError: nothing to draw, or a name without rows.
     """
-    empty = [name for name, rows in rates.items() if len(rows) == 0]
-    if empty or not rates:
+    empty = [name for rates in panels.values() for name, rows in rates.items() if len(rows) == 0]
+    if empty or not any(panels.values()):
         raise InputError(f"no rates to draw for {', '.join(empty) or 'any name'}; give at least one row each")
-    figure, axes = _figure(width=8.0, height=4.0)
-    looks = itertools.product(("solid", (0, (4, 2)), (0, (1, 1.5))), COLOURS)
-    for (name, rows), (line, colour) in zip(rates.items(), itertools.cycle(looks), strict=False):
-        worlds, median, least, greatest = rows[np.argsort(rows[:, 0])].T
-        axes.plot(worlds, median, color=colour, linestyle=line, marker="o", markersize=3.5, label=name)
-        axes.vlines(worlds, least, greatest, color=colour, linewidth=1.2, alpha=0.7)
-    axes.set_xscale("log", base=2)
-    axes.set_yscale("log")
-    axes.set_xticks(sorted({float(n) for rows in rates.values() for n in rows[:, 0]}), minor=False)
-    axes.xaxis.set_major_formatter(ticker.StrMethodFormatter("{x:,.0f}"))
-    axes.yaxis.set_major_formatter(ticker.EngFormatter(sep=""))
-    axes.set_xlabel("worlds")
-    axes.set_ylabel(label)
-    _legend_above(axes, columns=3)
+    names = list(dict.fromkeys(name for rates in panels.values() for name in rates))
+    looks = itertools.product(("solid", (0, (4, 2))), COLOURS)
+    look = dict(zip(names, itertools.cycle(looks), strict=False))
+    columns = min(len(panels), 3)
+    lines = -(-len(panels) // columns)
+    figure = Figure(figsize=(2.6 + 2.3 * columns, 0.9 + 2.5 * lines), layout="constrained")
+    grid = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    known = {}
+    for axes, (scene, rates) in zip(grid, panels.items(), strict=False):
+        for name, rows in rates.items():
+            worlds, median, least, greatest = rows[np.argsort(rows[:, 0])].T
+            line, colour = look[name]
+            (known[name],) = axes.plot(
+                worlds, median, color=colour, linestyle=line, marker="o", markersize=3.5, label=name
+            )
+            axes.vlines(worlds, least, greatest, color=colour, linewidth=1.2, alpha=0.7)
+        axes.set_xscale("log", base=2)
+        axes.set_yscale("log")
+        axes.set_title(scene, loc="left")
+        axes.xaxis.set_major_formatter(ticker.StrMethodFormatter("{x:,.0f}"))
+        axes.yaxis.set_major_formatter(ticker.EngFormatter(sep=""))
+        axes.grid(visible=True)
+        axes.tick_params(length=0, which="both", labelbottom=True, labelleft=True)
+    for axes in grid[len(panels) :]:
+        axes.set_visible(False)
+    figure.supxlabel("worlds", fontsize=10)
+    figure.supylabel(label, fontsize=10)
+    figure.legend(known.values(), known, loc="outside upper left", ncols=min(len(known), 4), handlelength=1.6)
     return figure
 
 

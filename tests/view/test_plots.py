@@ -70,8 +70,13 @@ def test_retarget_errors_name_their_medians():
 
 def test_throughput_shows_medians_in_order_with_the_spread_of_runs():
     rows = np.array([[64, 9e3, 8e3, 1e4], [1, 2e3, 1e3, 3e3]])
-    figure = plots.throughput({"native": rows, "mjx": rows[:1] / 10}, label="steps/s")
+    figure = plots.throughput(
+        {"pinch": {"native": rows, "mjx": rows[:1] / 10}, "power": {"mjx": rows}}, label="steps/s"
+    )
     np.testing.assert_allclose(line(figure, "native"), [[1, 2e3], [64, 9e3]])
+    assert [axes.get_title("left") for axes in figure.axes] == ["pinch", "power"]
+    mjx = [[one.get_color() for one in axes.lines if one.get_label() == "mjx"] for axes in figure.axes]
+    assert mjx[0] == mjx[1]
     spread = [corners(path) for path in figure.axes[0].collections[0].get_paths()]
     np.testing.assert_allclose(spread, [[[1, 1e3], [1, 3e3]], [[64, 8e3], [64, 1e4]]])
     assert figure.axes[0].get_xscale() == figure.axes[0].get_yscale() == "log"
@@ -86,7 +91,7 @@ def test_throughput_shows_medians_in_order_with_the_spread_of_runs():
         (lambda: plots.joint_errors(["a"], {}), "at least one method"),
         (lambda: plots.joint_errors(["a"], {"m": np.ones((4, 2))}), "2 columns for 1 joints"),
         (lambda: plots.retarget_errors({"tip": np.zeros(0)}), "no errors to draw for tip"),
-        (lambda: plots.throughput({"native": np.zeros((0, 4))}, label="steps/s"), "no rates to draw for native"),
+        (lambda: plots.throughput({"p": {"native": np.zeros((0, 4))}}, label="steps/s"), "no rates to draw for native"),
     ],
 )
 def test_bad_input_is_refused(make, message):

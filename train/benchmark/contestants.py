@@ -26,6 +26,20 @@ PASS = 5  # control steps from start to start: worlds stay near the states they 
 
 
 @dataclass(frozen=True)
+class Memory:
+    """Memory in bytes; None where the system does not tell.
+
+    Attributes:
+        host: how much the process's resident memory grew at its peak, while the contestant was made, compiled and run
+            for the first time.
+        device: the accelerator's peak since the process began.
+    """
+
+    host: int | None
+    device: int | None
+
+
+@dataclass(frozen=True)
 class Contestant:
     """Something that steps worlds.
 
@@ -36,6 +50,7 @@ class Contestant:
         compile_seconds: until it could run for the first time; None where nothing is compiled.
         advance: steps all worlds by a number of control steps, a multiple of `unit`; returns their qpos then.
         unit: see `advance`.
+        memory: what it took, where that was measured (`train.benchmark.memory`).
     """
 
     name: str
@@ -44,6 +59,7 @@ class Contestant:
     compile_seconds: float | None
     advance: Callable[[int], Any]
     unit: int = 1
+    memory: Memory | None = None
 
 
 @dataclass(frozen=True)

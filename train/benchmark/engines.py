@@ -1,32 +1,37 @@
 """`python -m train.benchmark engines`: steps a second of each physics engine, and of MuJoCo's own ways beside them.
 
-All work on the pinch scene. *environment* is what training steps: physics, rewards, observations and restarts under
-random actions. *physics* is the engine alone. Each contestant runs once a round, so that the ratios hold on a machine
-whose speed drifts.
+Each grasp type's scene is stepped by itself. *physics* is the engine alone, under the demonstrations' targets with
+random residuals. *environment* is what training steps: physics, rewards, observations and restarts under random
+actions. Of one type, each contestant runs once a round, so that the ratios hold on a machine whose speed drifts.
 """
 
 import contextlib
 import dataclasses
+import functools
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
 from envs.demonstrations.dataset import SetSettings
+from envs.grasps import grasp_names, grasp_type
 from envs.physics import ENGINES, default_engine
 from envs.physics.native import cores
+from envs.scene import TIMESTEP
+from envs.task import Task
 from mjx_hand.errors import InputError
 from mjx_hand.view.progress import counter
 from train.benchmark.contestants import Contestant, environment, open_rollout, physics, step_loop
 from train.benchmark.engine_report import Results, Row, text, write
 from train.benchmark.learning import Learning, measure_learning
 from train.benchmark.machine import accelerator
+from train.benchmark.memory import fitting, with_memory
 from train.benchmark.timing import rates
 from train.config import Config
 from train.experiment import World, make_world
 
-_DATA = SetSettings(grasp="pinch", people=1, heldout_people=1, trials=2)
-_CPU_WORLDS, _ACCELERATOR_WORLDS = (1, 64, 256), (1, 256, 1024, 4096)
+_CPU_WORLDS, _ACCELERATOR_WORLDS = (1, 16, 64, 256), (1, 256, 1024, 4096)
+_COMPILED_ON_CPU = "pinch"  # the one type of engines that take a minute to compile for each number of worlds
 
 
 def _default_engines() -> tuple[str, ...]:
@@ -38,22 +43,33 @@ def _default_worlds() -> tuple[int, ...]:
     return _ACCELERATOR_WORLDS if accelerator() else _CPU_WORLDS
 
 
+def _default_compiled() -> tuple[str, ...]:
+    return () if accelerator() else (_COMPILED_ON_CPU,)
+
+
 @dataclasses.dataclass(frozen=True)
 class Options:
-    """Measure how fast the physics engines step the pinch scene here.
+    """Measure how fast the physics engines step the scenes of the grasp types here.
 
     Attributes:
+        grasps: the types; all if none is named.
         engines: native, mjx, warp.
+        compiled: types that mjx and warp are measured on, where they take a minute to compile for each number of
+            worlds; all if none is named.
         worlds: numbers of worlds in parallel.
+        full: on an accelerator, go on doubling the greatest number of worlds until its memory is full.
         runs: timed runs of each contestant, of which the median, least and greatest are given.
         seconds: how long a run should last.
         ppo: measure training as well, on the engine that training picks and the greatest number of worlds.
-        out: folder for engines.json and engines.png.
+        out: folder for engines.md, engines.json and engines.png.
         demonstrations: folder below which demonstration sets are kept, and made where missing.
     """
 
+    grasps: tuple[str, ...] = ()
     engines: tuple[str, ...] = dataclasses.field(default_factory=_default_engines)
+    compiled: tuple[str, ...] = dataclasses.field(default_factory=_default_compiled)
     worlds: tuple[int, ...] = dataclasses.field(default_factory=_default_worlds)
+    full: bool = dataclasses.field(default_factory=lambda: accelerator() is not None)
     runs: int = 5
     seconds: float = 0.3
     ppo: bool = False
@@ -68,27 +84,33 @@ def report(options: Options) -> list[str]:
         InputError: for options out of range, or a folder that cannot be written.
     """
     _check(options)
-    engines, missing = split(options.engines)
-    worlds = sorted(set(options.worlds))
+    grasps = [grasp_type(name).name for name in options.grasps or grasp_names()]
+    compiled = [grasp_type(name).name for name in options.compiled or grasps]
+    engines, notes = split(options.engines)
+    notes += _left_out(engines, grasps, compiled)
+    task = Task()
+    rows, learning = [], []
     with contextlib.redirect_stdout(sys.stderr):  # progress; the report alone goes to standard output
-        made = {
-            name: make_world(config(name, options.demonstrations), "train")
-            for name in dict.fromkeys((*engines, "native"))
-        }
-        entered = list(_enter(made, engines, worlds))
-        with counter(options.runs * len(entered), "timing") as advance:
-            measured = rates(entered, options.runs, options.seconds, advance)
-        learning = _learning(options, made, entered) if options.ppo else None
-    env = made["native"].env
-    results = Results(
-        rows=[Row.of(c, rate, env.dt, env.task.substeps) for c, rate in zip(entered, measured, strict=True)],
-        learning=learning,
-        missing=missing,
-        substeps=env.task.substeps,
-        dt=env.dt,
-    )
-    files = write(results, options.out, {k: getattr(options, k) for k in ("engines", "worlds", "runs", "seconds")})
-    return [*text(results), "", *(str(file) for file in files)]
+        for grasp in grasps:
+            here = [name for name in engines if name == "native" or grasp in compiled]
+            made = {
+                name: make_world(config(name, grasp, options.demonstrations), "train")
+                for name in dict.fromkeys((*here, "native"))
+            }
+            entered = list(_enter(made, here, options, notes))
+            with counter(options.runs * len(entered), f"timing {grasp}") as advance:
+                measured = rates(entered, options.runs, options.seconds, advance)
+            rows += [
+                Row.of(grasp, c, rate, made["native"].env.dt, task.substeps)
+                for c, rate in zip(entered, measured, strict=True)
+            ]
+            if options.ppo and default_engine() in here:
+                learning.append(_learning(options, grasp, made, entered))
+    results = Results(rows=rows, learning=learning, notes=notes, substeps=task.substeps, dt=task.substeps * TIMESTEP)
+    kept = ("grasps", "engines", "compiled", "worlds", "full", "runs", "seconds")
+    lines = text(results)
+    files = write(results, lines, options.out, {name: getattr(options, name) for name in kept})
+    return [*lines, "", *(str(file) for file in files)]
 
 
 def _check(options: Options) -> None:
@@ -103,43 +125,70 @@ def _check(options: Options) -> None:
         raise InputError(f"ppo runs on engine {default_engine()} here; add it to the engines, or leave ppo out")
 
 
-def split(engines: Sequence[str]) -> tuple[list[str], dict[str, str]]:
-    """Engines that are here, and how to install each of the others."""
-    missing = {
-        name: "not installed; install it with: pip install 'mjx-hand[warp]'"
-        for name in engines
-        if name == "warp" and find_spec("warp") is None
-    }
-    return [name for name in dict.fromkeys(engines) if name not in missing], missing
+def split(engines: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Engines that are here, and a line on each of the others."""
+    missing = [name for name in engines if name == "warp" and find_spec("warp") is None]
+    return [name for name in dict.fromkeys(engines) if name not in missing], [
+        f"{name}: not installed; install it with: pip install 'mjx-hand[warp]'" for name in missing
+    ]
 
 
-def config(engine: str, demonstrations: Path) -> Config:
-    """The experiment that is measured: the pinch task on a set that is made in seconds."""
-    return Config(name="benchmark", engine=engine, data=_DATA, demonstrations=str(demonstrations))
-
-
-def _enter(made: Mapping[str, World], engines: Sequence[str], worlds: Sequence[int]) -> Iterator[Contestant]:
-    """All contestants, compiled.
-
-    MJX takes a minute to compile, so only two engines are measured alone: `native`, beside MuJoCo's own ways, and on
-    the greatest number of worlds the one that training picks here.
-    """
-    native = made["native"].env
+def _left_out(engines: Sequence[str], grasps: Sequence[str], compiled: Sequence[str]) -> list[str]:
+    """A line on what is not measured, and why."""
+    notes = []
+    if not accelerator():
+        notes.append("no accelerator: warp and GPU curves not measured")
+    without = [name for name in grasps if name not in compiled]
     for name in engines:
-        for count in worlds:
-            print(f"compiling {name}, environment, {count} worlds", flush=True)
-            yield environment(made[name].env, count)
-        alone = worlds if name == "native" else worlds[-1:] if name == default_engine() else []
-        for count in alone:
-            print(f"compiling {name}, physics, {count} worlds", flush=True)
-            yield physics(made[name].env, count)
-    yield step_loop(native)
+        if name != "native" and without:
+            notes.append(f"{name}: {', '.join(without)} left out, for the time it takes to compile (--compiled NAMES)")
+    return notes
+
+
+def config(engine: str, grasp: str, demonstrations: Path) -> Config:
+    """The experiment that is measured: the type's task on a small set."""
+    data = SetSettings(grasp=grasp, people=1, heldout_people=1, trials=2)
+    return Config(name="benchmark", engine=engine, data=data, demonstrations=str(demonstrations))
+
+
+def _enter(
+    made: Mapping[str, World], engines: Sequence[str], options: Options, notes: list[str]
+) -> Iterator[Contestant]:
+    """All contestants, compiled and run once. The environment is entered on the engine that training picks here."""
+    worlds = sorted(set(options.worlds))
+    for name in engines:
+        env = made[name].env
+        parts = [physics, environment] if name == default_engine() else [physics]
+        for enter, scope in zip(parts, ("physics", "environment"), strict=False):
+            for count in _counts(worlds, options.full and name != "native"):
+                print(f"compiling {name}, {scope}, {count} worlds", flush=True)
+                contestant = fitting(functools.partial(enter, env, count))
+                if contestant is None:
+                    notes.append(f"{name}, {scope}: {count:,} worlds do not fit into memory")
+                    break
+                yield contestant
+    native = made["native"].env
+    yield with_memory(functools.partial(step_loop, native))
     for count in worlds:
-        yield open_rollout(native, count, cores())
+        yield with_memory(functools.partial(open_rollout, native, count, cores()))
 
 
-def _learning(options: Options, made: Mapping[str, World], entered: Sequence[Contestant]) -> Learning:
+def _counts(worlds: Sequence[int], full: bool) -> Iterator[int]:
+    """The numbers of worlds, and if `full` the greatest doubled again and again."""
+    yield from worlds
+    count = worlds[-1]
+    while full:
+        count *= 2
+        yield count
+
+
+def _learning(options: Options, grasp: str, made: Mapping[str, World], entered: Sequence[Contestant]) -> Learning:
     name = default_engine()
-    alone = max((c for c in entered if (c.name, c.scope) == (name, "physics")), key=lambda c: c.worlds)
-    print(f"training on {name}, {alone.worlds} worlds", flush=True)
-    return measure_learning(config(name, options.demonstrations), made[name], alone, options.runs, options.seconds)
+    most = max(options.worlds)
+    alone, around = (
+        next(c for c in entered if (c.name, c.scope, c.worlds) == (name, scope, most))
+        for scope in ("physics", "environment")
+    )
+    print(f"training {grasp} on {name}, {most} worlds", flush=True)
+    made_of = config(name, grasp, options.demonstrations)
+    return measure_learning(made_of, made[name], alone, around, options.runs, options.seconds)
