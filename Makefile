@@ -8,7 +8,7 @@ PIP_FLAGS := --quiet --disable-pip-version-check
 WORKERS ?= 2
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo results test test-slow lint format types bench lock clean
+.PHONY: help setup demo results ablations test test-slow lint format types bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -40,6 +40,9 @@ demo: $(STAMP)  ## retarget a recording, train a pinch policy, write a report wi
 
 results: $(STAMP)  ## train and evaluate the five grasp types, three seeds each, on one page (hours; goes on where it stopped)
 	$(BIN)/python -m train.results
+
+ablations: $(STAMP)  ## what each part of the method is worth: variants at equal budgets, three seeds, on one page (hours; goes on)
+	$(BIN)/python -m train.ablations
 
 test: $(STAMP)  ## run the tests
 	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
