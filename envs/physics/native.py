@@ -21,7 +21,8 @@ from envs.physics.engine import PhysicsState
 from envs.physics.host_call import HostFunction
 from envs.physics.solver import gauss_seidel
 
-# Fields of the integration state that one step hands to the next; the control comes with each step.
+# Fields of the integration state that one step hands to the next, in its order and at the front of its rows; what comes
+# next, the control, comes with each step.
 CARRIED = ("time", "qpos", "qvel", "act", "qacc_warmstart")
 # Warnings that mean the engine found a bad number and reset the simulation by itself.
 DIVERGED = [
@@ -119,15 +120,14 @@ class NativeEngine:
         if not np.array_equal(self._running[count], variant):
             worlds.set_models([self.models[v] for v in variant])
             self._running[count] = variant.copy()
-        for field in CARRIED:
-            target = worlds.bind(field)
-            target[...] = carried[:, self._slices[field]].reshape(target.shape)
+        worlds.state[:, : self._size] = carried
         worlds.warning[...] = 0
         return worlds
 
     def _unload(self, worlds: batch.Batch, lead: tuple[int, ...]) -> tuple[np.ndarray, ...]:
-        carried = np.concatenate([worlds.bind(f).reshape(worlds.nsim, -1) for f in CARRIED], axis=1)
-        fields = [worlds.bind(f).astype(np.float32) for f in ("qpos", "qvel", "sensordata")]
+        carried = worlds.state[:, : self._size].copy()
+        moving = [carried[:, self._slices[field]] for field in ("qpos", "qvel")]
+        fields = [field.astype(np.float32) for field in (*moving, worlds.bind("sensordata"))]
         unstable = (worlds.warning[:, DIVERGED, 1] > 0).any(axis=1).astype(np.float32)
-        bits = np.ascontiguousarray(carried).view(np.uint32)
+        bits = carried.view(np.uint32)
         return (bits.reshape(*lead, -1), *(f.reshape(*lead, -1) for f in fields), unstable.reshape(lead))
