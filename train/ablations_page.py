@@ -102,12 +102,13 @@ def _spread(name: str, values: Sequence[float]) -> str:
     return f"{mean} ({least.rstrip(' %cm°')} to {greatest.rstrip(' %cm°')})"
 
 
-def _changes_table(ablation: Ablation) -> Table:
-    rows = [
-        (variant.name, variant.why, " ".join(variant.overrides) or ("" if variant.learns else "nothing is trained"))
+def _meanings(ablations: Sequence[Ablation]) -> dict[str, str]:
+    """What each variant shows, and the options that make it."""
+    return {
+        variant.name: " ".join([variant.why, *(f"({override})" for override in variant.overrides)])
+        for ablation in ablations
         for variant, _ in ablation.measured
-    ]
-    return Table(("", "what it shows", "changes"), rows)
+    }
 
 
 def _page(ablations: Sequence[Ablation], command: str) -> Report:
@@ -122,10 +123,14 @@ def _page(ablations: Sequence[Ablation], command: str) -> Report:
             for section in (
                 Section(f"{ablation.name}: held-out demonstrations", [ablation_table(ablation)]),
                 Section(f"{ablation.name}: learning", _curves(ablation)),
-                Section(f"{ablation.name}: variants", [_changes_table(ablation)]),
             )
         ],
-        how=[*((a.name, _made_with(a)) for a in ablations), ("this machine", hardware), ("versions", packages)],
+        how=[
+            *_meanings(ablations).items(),
+            *((ablation.name, _made_with(ablation)) for ablation in ablations),
+            ("this machine", hardware),
+            ("versions", packages),
+        ],
         commands=[command],
     )
 
@@ -177,14 +182,15 @@ def _not_done(ablations: Sequence[Ablation]) -> str:
 def _markdown(ablations: Sequence[Ablation], folder: Path, command: str) -> str:
     lines = ["# Ablations", "", _TASK + _not_done(ablations), ""]
     for ablation in ablations:
-        table, changes = ablation_table(ablation), _changes_table(ablation)
+        table = ablation_table(ablation)
         lines += [f"## {ablation.name}", "", f"{_made_with(ablation)}.", "", *markdown_rows(table), "", table.note, ""]
-        lines += [*markdown_rows(changes), "", "Every demonstration:", ""]
+        lines += ["Every demonstration:", ""]
         for variant, experiment in ablation.measured:
             if variant.learns:
                 where = Path(os.path.relpath(experiment.folder, folder)).as_posix()
                 lines.append(f"- [{variant.name}](<{where}/evaluation.html>)")
         lines.append("")
+    lines += ["## Variants", "", *(f"- {name}: {meaning}" for name, meaning in _meanings(ablations).items()), ""]
     lines += [*(f"- {line}" for line in machine(*PACKAGES)), "", f"    {command}"]
     return "\n".join(lines) + "\n"
 
