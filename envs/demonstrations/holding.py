@@ -28,7 +28,9 @@ _TOUCH, _CLEAR, _LIMIT = 0.001, 0.0005, 0.02
 _OPPOSED, _NEAR = 0.1, 0.02  # directions that should be opposite; middle phalanges and palm, which need not touch (m)
 _OFF_PLACE, _OFF_TURN, _OFF_SPIN, _OFF_ANGLE = 0.015, 0.1, 0.8, 0.25
 _STEPS = 60
-_SPINS = np.deg2rad(np.arange(-90, 91, 30))  # about the object's axis: where to start looking, as there are many minima
+_SPINS = np.deg2rad(
+    np.arange(-180, 180, 30)
+)  # about the object's axis: where to start looking, as there are many minima
 _INWARDS = (0.0, 0.02)  # m towards the palm, likewise
 _PALM = np.array([0.0, 1.0, 0.0])  # towards the back of the hand
 
@@ -47,8 +49,11 @@ class Holding:
     position: Float[np.ndarray, "3"]
 
 
-def solve_holding(recorded: Holding, hand: RigidHand, planes: Float[np.ndarray, "h f 4"]) -> Holding:
-    """The holding nearest to a recorded one in which the last phalanges touch and no link is inside the object.
+def solve_holdings(recorded: Holding, hand: RigidHand, planes: Float[np.ndarray, "h f 4"]) -> list[Holding]:
+    """Holdings near a recorded one in which the last phalanges touch and no link is inside the object, nearest first.
+
+    An object that looks much the same from all sides can lie in the hand in several ways: one for each way to turn it
+    about its axis to begin with.
 
     Args:
         recorded: as captured.
@@ -68,7 +73,10 @@ def solve_holding(recorded: Holding, hand: RigidHand, planes: Float[np.ndarray, 
                 max_nfev=_STEPS,
             )
         )
-    x = min(found, key=lambda one: one.cost).x
+    return [_holding(one.x, recorded, hand) for one in sorted(found, key=lambda one: one.cost)]
+
+
+def _holding(x: Float[np.ndarray, "26"], recorded: Holding, hand: RigidHand) -> Holding:
     angles, rotation, position = (np.asarray(a, float) for a in _placed(jnp.asarray(x), _rows(recorded)))
     angles = np.clip(angles, hand.hinge_lower, hand.hinge_upper)
     return Holding(angles=angles, rotation=Rotation.from_matrix(rotation).as_matrix(), position=position)

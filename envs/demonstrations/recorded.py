@@ -14,7 +14,8 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from envs.convex_pieces import convex_pieces
-from envs.demonstrations.holding import Holding, solve_holding, spin_of
+from envs.demonstrations.firmness import firmest
+from envs.demonstrations.holding import Holding, solve_holdings, spin_of
 from envs.demonstrations.standing import Table, find_table, world_from_recording
 from envs.signed_distance import hull_planes
 from mjx_hand.capture.datasets.dexmv_object import RecordedObject, load_object, recording_files
@@ -80,7 +81,9 @@ def read_demonstration(
     lowest = np.einsum("tj,cj->tc", now.rotation[:, 2], corners).min(axis=1) + now.position[:, 2]
     now.position[:, 2] += np.maximum(-lowest, 0.0)  # the filter rounds off how the object leaves the table
 
-    holding = solve_holding(held, hand, hull_planes(description.hulls))
+    carrying = now.hand_rotation[int(np.argmax(now.position[:, 2]))]
+    holdings = solve_holdings(held, hand, hull_planes(description.hulls))
+    holding = firmest(holdings, hand, description, carrying)
     times = now.times - table.lifted / motion.fps
     share = _minimum_jerk((times + _CLOSING) / (_CLOSING - _HELD))
     # An object that looks the same from all sides was turned about its axis otherwise than it seemed, and not the hand.
