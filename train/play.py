@@ -1,9 +1,13 @@
 """Play a policy in the browser, in real time: `python -m train.play config=pinch`.
 
 Shows a held-out demonstration, its twin under the policy, the object, and the error. `play.demonstration=3` chooses
-one; without it, the one of median tracking error. `play.unstable=FILE` shows a simulation that diverged in training
-instead: the state before the step, and each physics step of it that the engine could make.
+one; without it, the one of median tracking error. What has not been trained here is played by the policy that comes
+with the project, on the demonstration beside it, where there is one. `play.unstable=FILE` shows a simulation that
+diverged in training instead: the state before the step, and each physics step of it that the engine could make.
 """
+
+import dataclasses
+from pathlib import Path
 
 import numpy as np
 
@@ -12,7 +16,8 @@ from envs.rolling import make_roll_out
 from mjx_hand.errors import InputError
 from mjx_hand.view.viewer import Viewer
 from train.config import Config, command
-from train.experiment import chosen_checkpoint, make_world
+from train.experiment import World, chosen_checkpoint, make_world
+from train.included import included_policy, included_world
 from train.play_scene import rollout_scene
 from train.policy import deterministic_policy
 from train.unstable import load_unstable
@@ -45,7 +50,7 @@ def rollout_viewer(config: Config) -> Viewer:
     Raises:
         InputError: no such demonstration, or what `chosen_checkpoint` and `Viewer` refuse.
     """
-    world = make_world(config, "heldout")
+    config, world = _world(config)
     checkpoint = chosen_checkpoint(config, world.env.observation_size)
     policy = deterministic_policy(config.ppo, world.env.observation_size, world.env.action_size)
     rollouts = make_roll_out(world.env, world.hands, policy)(checkpoint.policy)
@@ -60,6 +65,16 @@ def rollout_viewer(config: Config) -> Viewer:
     title = f"{config.name} {index}: {outcome}, {errors[index]:.2f} cm"
     scene = rollout_scene(world.demonstrations[index], rollouts, index, world.hands[index], title)
     return Viewer(scene, config.play.port)
+
+
+def _world(config: Config) -> tuple[Config, World]:
+    """The demonstrations to play, and the configuration with the policy to play them."""
+    included = included_policy(config.name)
+    if config.checkpoint or included is None or (Path(config.out) / "best.npz").is_file():
+        return config, make_world(config, "heldout")
+    print(f"nothing is trained in {config.out}: playing the policy that comes with mjx-hand", flush=True)
+    config = dataclasses.replace(config, checkpoint=str(included))
+    return config, included_world(config) if config.play.demonstration is None else make_world(config, "heldout")
 
 
 def main(config: Config) -> None:
