@@ -18,7 +18,8 @@ def newton(models: Sequence[mujoco.MjModel]) -> list[mujoco.MjModel]:
 def gauss_seidel(models: Sequence[mujoco.MjModel]) -> list[mujoco.MjModel]:
     """Copies for MuJoCo's C engine: projected Gauss-Seidel on the few forces of a grasp.
 
-    20 sweeps step two to three times as fast as Newton's method and hold and drop the same objects.
+    20 sweeps hold and drop the same objects as Newton's method, and under training's commands, which jump every 20 ms
+    by random residuals, step up to twice as fast; under smooth ones they are no faster (`docs/physics.md`).
     """
     return _set(models, mujoco.mjtSolver.mjSOL_PGS, iterations=20)
 
