@@ -4,6 +4,7 @@ target(t) = demonstration(t) + grip(t) + residual(t), the first led by the contr
 residual <- tau residual + (1 - tau) scale action (arXiv 2512.07359, section IV).
 """
 
+import dataclasses
 from collections.abc import Sequence
 from typing import cast
 
@@ -13,17 +14,18 @@ import numpy as np
 from brax.envs.base import Env, State
 from jaxtyping import Array, Float, Int
 
+from envs.kept import kept, model_bytes
 from envs.observation import observe, residual_scale
 from envs.physics import make_engine
 from envs.physics.engine import PhysicsState
-from envs.reference import make_reference
+from envs.reference import Reference, make_reference
 from envs.replay import assisted_replay
 from envs.scene import NUM_WRIST, OBJECT, demonstration_models
 from envs.task import Task
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.motion.demonstration import Demonstration
-from mjx_hand.pytree import pytree
+from mjx_hand.pytree import pytree, replace
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand
 from mjx_hand.rotations import quaternion_difference
@@ -72,7 +74,7 @@ class TrackingEnv(Env):
     ):
         self.task = Task() if task is None else task
         gains = Gains() if gains is None else gains
-        self.reference = make_reference(demonstrations, hands, grip_force=self.task.grip_force, gains=gains)
+        self.reference = _kept_reference(demonstrations, hands, self.task.grip_force, gains)
         self.assisted = self.task.assist > 0
         self.models = demonstration_models(demonstrations, hands, gains=gains, assisted=self.assisted)
         self.engine = make_engine(engine, self.models, self.task.substeps)
@@ -196,15 +198,32 @@ class TrackingEnv(Env):
         turn = quaternion_difference(pose[3:], thing[3:])
         return jnp.linalg.norm(thing[:3] - pose[:3]), jnp.sqrt(jnp.sum(turn**2) + 1e-12)
 
+    def _replayed(self) -> dict[str, np.ndarray]:
+        states = assisted_replay(self.models, self.reference, self.task.substeps)
+        return {name: np.asarray(a, np.float32) for name, a in zip(("qpos", "qvel", "ctrl"), states, strict=True)}
+
     def _start_table(self) -> PhysicsState:
         """The engine's state at every frame of every demonstration, so that a reset is a look-up."""
-        qpos, qvel, ctrl = assisted_replay(self.models, self.reference, self.task.substeps)
+        replayed = kept(self._replayed, *(model_bytes(m) for m in self.models), self.reference, self.task.substeps)
+        qpos, qvel, ctrl = (replayed[name] for name in ("qpos", "qvel", "ctrl"))
         count, frames = qpos.shape[:2]
         variant = np.repeat(np.arange(count, dtype=np.int32), frames)
         ctrl = np.pad(ctrl, ((0, 0), (0, 0), (0, self.models[0].nu - self.action_size)))  # the object's motors rest
-        rows = (variant, *(np.asarray(a, np.float32).reshape(count * frames, -1) for a in (qpos, qvel, ctrl)))
+        rows = (variant, *(a.reshape(count * frames, -1) for a in (qpos, qvel, ctrl)))
         table = jax.jit(lambda r: jax.lax.map(lambda row: self.engine.reset(*row), r, batch_size=1024))(rows)
         return jax.tree.map(lambda leaf: leaf.reshape(count, frames, *leaf.shape[1:]), table)
+
+
+def _kept_reference(
+    demonstrations: Sequence[Demonstration], hands: Sequence[RigidHand], grip_force: float | None, gains: Gains
+) -> Reference:
+    def compute() -> dict[str, np.ndarray]:
+        made = make_reference(demonstrations, hands, grip_force=grip_force, gains=gains)
+        return {field.name: np.asarray(getattr(made, field.name)) for field in dataclasses.fields(made)}
+
+    bare = [replace(hand, mesh_vertices=(), mesh_faces=()) for hand in hands]
+    arrays = kept(compute, list(demonstrations), bare, grip_force, dataclasses.astuple(gains))
+    return Reference(**{name: jnp.asarray(array) for name, array in arrays.items()})
 
 
 _TERMS = ("reward/position", "reward/rotation", "reward/action")
