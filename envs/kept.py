@@ -2,6 +2,7 @@
 
 import contextlib
 import hashlib
+import inspect
 import os
 from collections.abc import Callable, Mapping
 from importlib.metadata import version
@@ -12,14 +13,13 @@ import jax
 import mujoco
 import numpy as np
 
-import envs
-import mjx_hand
 from mjx_hand.errors import InputError
 from mjx_hand.motion.archive import load_arrays, save_arrays
 
 SCHEMA = "mjx-hand/kept/1"
 _FOLDER = "arrays"
 _MOST = 40  # files; those that were used longest ago are deleted
+_CODE = (Path(inspect.getfile(InputError)).parent, Path(__file__).parent)  # all: what matters is too easily missed
 _LIBRARIES = ("jax", "jaxlib", "mujoco", "numpy", "scipy")
 
 
@@ -72,8 +72,7 @@ def _digest(ingredients: Any) -> str:
     content = hashlib.sha256()
     for library in _LIBRARIES:
         content.update(f"{library} {version(library)} ".encode())
-    for package in (mjx_hand, envs):  # all code: which of it matters is too easily missed
-        root = Path(package.__path__[0])
+    for root in _CODE:
         for source in sorted(root.rglob("*.py")):
             content.update(str(source.relative_to(root)).encode())
             content.update(source.read_bytes())

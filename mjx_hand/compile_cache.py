@@ -1,7 +1,7 @@
 """JAX's persistent compilation cache in the user's own cache folder.
 
 Compiling costs seconds to minutes a function, running it milliseconds: commands and tests keep what they compiled.
-The folder holds nothing else and may be deleted at any time.
+The folder holds nothing but what can be made anew, and may be deleted at any time.
 """
 
 import os
