@@ -14,6 +14,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from envs.demonstrations.dataset import SetSettings
 from envs.physics import ENGINES
+from envs.settings import made_of
 from envs.task import Task
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
@@ -124,19 +125,7 @@ def to_config(composed: DictConfig) -> Config:
     """
     if composed.seeds:
         raise InputError(f"seeds is {list(composed.seeds)}, but this takes one seed; give it alone, such as seed=0")
-    return _made(Config, OmegaConf.to_container(composed, resolve=True, throw_on_missing=True))
-
-
-def _made(cls: Any, values: Any) -> Any:
-    """A dataclass from nested dictionaries. Configuration files have lists where frozen dataclasses have tuples."""
-    given = {}
-    for field in dataclasses.fields(cls):
-        if field.name in values:
-            value = values[field.name]
-            if isinstance(value, dict):
-                value = _made(field.type, value)
-            given[field.name] = tuple(value) if isinstance(value, list) else value
-    return cls(**given)
+    return made_of(Config, OmegaConf.to_container(composed, resolve=True, throw_on_missing=True))
 
 
 def command(task: Callable[[Config], object]) -> None:

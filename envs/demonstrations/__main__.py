@@ -24,6 +24,7 @@ from envs.demonstrations.perform import OUTCOMES
 from envs.demonstrations.quality import check_part
 from envs.demonstrations.recorded import RECORDED
 from envs.demonstrations.trials import NO_POSTURE, SPARE
+from envs.settings import made_of
 from mjx_hand.cli.output import print_table
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
@@ -55,7 +56,7 @@ def settings_of(arguments: Sequence[str]) -> tuple[SetSettings, Path]:
         data = OmegaConf.to_container(OmegaConf.create(files[experiment].read_text()))
         overrides = OmegaConf.from_dotlist([f"{key.removeprefix('data.')}={value}" for key, value in given.items()])
         merged = OmegaConf.merge(schema, cast(dict, data).get("data", {}), overrides)
-        return cast(SetSettings, OmegaConf.to_object(merged)), Path(root)
+        return made_of(SetSettings, OmegaConf.to_container(merged, throw_on_missing=True)), Path(root)
     except OmegaConfBaseException as error:
         line = str(error).strip().splitlines()[0]
         raise InputError(f"{line}; python -m train.ppo --cfg job lists the options of data") from None

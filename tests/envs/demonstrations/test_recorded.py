@@ -36,7 +36,7 @@ def lifted_cube(seed: int, turn: Rotation, frames: int = 80, lift: int = 50) -> 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_up_is_found_in_a_tilted_recording(seed):
-    turn = Rotation.random(random_state=seed)
+    turn = Rotation.random(rng=np.random.default_rng(seed))
     table = find_table(lifted_cube(seed, turn))
     assert np.arccos(table.up @ turn.apply([0, 0, 1])) < np.deg2rad(1.5)
     assert abs(table.height - np.array([0.3, -0.2, 0.9]) @ table.up) < 0.006
