@@ -12,8 +12,9 @@ from jaxtyping import Array, Float
 
 from envs.signed_distance import signed_distance
 from mjx_hand.hand.joints import FINGERS
+from mjx_hand.rigid.capsules import capsule_points
 from mjx_hand.rigid.gains import Gains
-from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics
+from mjx_hand.rigid.rigid_hand import RigidHand
 
 _NEAR = 0.007  # m: a phalanx whose skin is closer than this is taken to touch
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
@@ -52,14 +53,12 @@ def grip_offsets(
     links = np.array([link for link in rigid.capsule_links if link > 0])
     of_finger = jnp.asarray((links[:, None] - 1) // 3 == np.arange(5), jnp.float32)  # (capsules, fingers)
     thumb = jnp.arange(5) == FINGERS.index("thumb")
-    ends, radius = rigid.capsule_ends[pads], rigid.capsule_radius[pads]
+    radius = rigid.capsule_radius[pads]
     stiffness, limit = jnp.asarray(gains.stiffness), jnp.asarray(gains.force_limit)
     rows = jnp.arange(len(links))
 
     def axis_points(q: Array) -> Array:
-        rot, pos = forward_kinematics(q, rigid)
-        near, far = (pos[links] + jnp.einsum("cij,cj->ci", rot[links], ends[:, k]) for k in (0, 1))
-        return near[:, None] + _ALONG[None, :, None] * (far - near)[:, None]
+        return capsule_points(q, rigid, _ALONG)[pads]
 
     def one(q: Array, rotation: Array, position: Array) -> Array:
         def distance(point: Array) -> Array:

@@ -70,10 +70,7 @@ def make_reference(
         targets.append(_padded(np.concatenate([wrist, d.motion.angles], axis=1), frames))
         poses.append(_padded(d.object_pose, frames))
         bases.append(base)
-        hand = Rotation.from_quat(_padded(d.motion.wrist_quaternion, frames), scalar_first=True)
-        thing = Rotation.from_quat(poses[-1][:, 3:], scalar_first=True)
-        offset = poses[-1][:, :3] - _padded(d.motion.wrist_position, frames)
-        relative.append(((hand.inv() * thing).as_matrix(), hand.inv().apply(offset)))
+        relative.append([_padded(rows, frames) for rows in object_in_hand(d)])
     targets = jnp.asarray(np.stack(targets), jnp.float32)
     rotation = jnp.asarray(np.stack([r for r, _ in relative]), jnp.float32)
     position = jnp.asarray(np.stack([p for _, p in relative]), jnp.float32)
@@ -94,6 +91,14 @@ def make_reference(
         features=jnp.asarray(features, jnp.float32),
         length=jnp.array([d.num_frames for d in demonstrations]),
     )
+
+
+def object_in_hand(demonstration: Demonstration) -> tuple[Float[np.ndarray, "t 3 3"], Float[np.ndarray, "t 3"]]:
+    """The object's rotation and position (m) in the wrist's frame."""
+    wrist = Rotation.from_quat(demonstration.motion.wrist_quaternion, scalar_first=True).inv()
+    thing = Rotation.from_quat(demonstration.object_pose[:, 3:], scalar_first=True)
+    offset = demonstration.object_pose[:, :3] - demonstration.motion.wrist_position
+    return (wrist * thing).as_matrix(), wrist.apply(offset)
 
 
 def _grips(

@@ -25,9 +25,9 @@ from envs.task import Task
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.motion.demonstration import Demonstration
-from mjx_hand.pytree import pytree, replace
+from mjx_hand.pytree import pytree
 from mjx_hand.rigid.gains import Gains
-from mjx_hand.rigid.rigid_hand import RigidHand
+from mjx_hand.rigid.rigid_hand import RigidHand, without_meshes
 from mjx_hand.rotations import quaternion_difference
 
 _TAIL = 10  # no episode starts in a demonstration's last frames, where nothing is left to learn
@@ -221,7 +221,7 @@ def _kept_reference(
         made = make_reference(demonstrations, hands, grip_force=grip_force, gains=gains)
         return {field.name: np.asarray(getattr(made, field.name)) for field in dataclasses.fields(made)}
 
-    bare = [replace(hand, mesh_vertices=(), mesh_faces=()) for hand in hands]
+    bare = [without_meshes(hand) for hand in hands]
     arrays = kept(compute, list(demonstrations), bare, grip_force, dataclasses.astuple(gains))
     return Reference(**{name: jnp.asarray(array) for name, array in arrays.items()})
 

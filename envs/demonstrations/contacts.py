@@ -7,16 +7,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
-from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.dataset import load_part, twins
 from envs.demonstrations.holding import capsule_gaps, last_phalanges
 from envs.demonstrations.quality import LIFT
+from envs.reference import object_in_hand
 from envs.signed_distance import hull_planes
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import Demonstration
-from mjx_hand.pytree import replace
-from mjx_hand.rigid.rigid_hand import RigidHand
+from mjx_hand.rigid.rigid_hand import RigidHand, without_meshes
 
 _RISEN = 0.02  # m: the object is in the hand
 
@@ -64,11 +63,8 @@ def check_contacts(folder: str | Path, part: str) -> Contacts:
 def demonstration_gaps(demonstration: Demonstration, hand: RigidHand) -> Float[np.ndarray, "t c"]:
     """Distance (m) of each of the hand's capsules from a mesh object in each frame; negative inside."""
     d = demonstration
-    wrist = Rotation.from_quat(d.motion.wrist_quaternion, scalar_first=True).inv()
-    rotation = (wrist * Rotation.from_quat(d.object_pose[:, 3:], scalar_first=True)).as_matrix()
-    position = wrist.apply(d.object_pose[:, :3] - d.motion.wrist_position)
-    bare = jax.tree.map(jnp.asarray, replace(hand, mesh_vertices=(), mesh_faces=()))
-    rows = tuple(jnp.asarray(a, jnp.float32) for a in (d.motion.angles, rotation, position))
+    bare = jax.tree.map(jnp.asarray, without_meshes(hand))
+    rows = tuple(jnp.asarray(a, jnp.float32) for a in (d.motion.angles, *object_in_hand(d)))
     return np.asarray(_gaps(rows, bare, jnp.asarray(hull_planes(d.object.hulls), jnp.float32)))
 
 

@@ -11,6 +11,7 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.holding import Holding
+from envs.demonstrations.perform import SLIP, SLIP_TURN
 from envs.grip import grip_offsets
 from envs.physics.solver import gauss_seidel
 from envs.scene import NUM_WRIST, scene_model
@@ -18,13 +19,11 @@ from envs.signed_distance import hull_planes
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.motion.demonstration import ObjectDescription
-from mjx_hand.pytree import replace
 from mjx_hand.rigid.gains import Gains
-from mjx_hand.rigid.rigid_hand import RigidHand
+from mjx_hand.rigid.rigid_hand import RigidHand, without_meshes
 
 _FORCES = (6.0, 9.0, 12.0, 16.0, 20.0)  # N
 _SQUEEZE, _CARRY = 100, 250  # physics steps without gravity, and with it
-_SLIP, _TURN = 0.01, np.deg2rad(15.0)  # as of performed grasps: what moves more in the hand is not held
 _NO_BOXES = np.zeros((0, 3))
 _HEIGHT = np.array([0.0, 0.0, 1.0])  # m above the table
 _THING = NUM_WRIST + NUM_HINGES
@@ -44,7 +43,7 @@ def firmest(
     Raises:
         InputError: none of them holds it.
     """
-    bare = jax.tree.map(jnp.asarray, replace(hand, mesh_vertices=(), mesh_faces=()))
+    bare = jax.tree.map(jnp.asarray, without_meshes(hand))
     planes = jnp.asarray(hull_planes(thing.hulls), jnp.float32)
     gains = Gains()
     (model,) = gauss_seidel([scene_model(hand, thing, _NO_BOXES, _NO_BOXES, wrist, gains=gains)])
@@ -84,4 +83,4 @@ def _holds(
     after = data.qpos[_THING:]
     turn = Rotation.from_quat(np.stack([before[3:], after[3:]]), scalar_first=True)
     slip = np.linalg.norm(after[:3] - before[:3])
-    return bool(slip < _SLIP and (turn[0].inv() * turn[1]).magnitude() < _TURN)
+    return bool(slip < SLIP and (turn[0].inv() * turn[1]).magnitude() < SLIP_TURN)

@@ -18,8 +18,8 @@ from scipy.spatial.transform import Rotation
 
 from envs.signed_distance import signed_distance
 from mjx_hand.hand.joints import FINGERS, NUM_HINGES, TIP_LINKS
-from mjx_hand.pytree import replace
-from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics
+from mjx_hand.rigid.capsules import capsule_points, last_capsule
+from mjx_hand.rigid.rigid_hand import RigidHand, without_meshes
 from mjx_hand.rotations import exp
 
 _ALONG = np.linspace(0.0, 1.0, 7)
@@ -28,10 +28,8 @@ _TOUCH, _CLEAR, _LIMIT = 0.001, 0.0005, 0.02
 _OPPOSED, _NEAR = 0.1, 0.02  # directions that should be opposite; middle phalanges and palm, which need not touch (m)
 _OFF_PLACE, _OFF_TURN, _OFF_SPIN, _OFF_ANGLE = 0.015, 0.1, 0.8, 0.25
 _STEPS = 60
-_SPINS = np.deg2rad(
-    np.arange(-180, 180, 30)
-)  # about the object's axis: where to start looking, as there are many minima
-_INWARDS = (0.0, 0.02)  # m towards the palm, likewise
+# Where to start looking, as there are many minima: turns about the object's axis, and ways towards the palm (m).
+_SPINS, _INWARDS = np.deg2rad(np.arange(-180, 180, 30)), (0.0, 0.02)
 _PALM = np.array([0.0, 1.0, 0.0])  # towards the back of the hand
 
 
@@ -60,7 +58,7 @@ def solve_holdings(recorded: Holding, hand: RigidHand, planes: Float[np.ndarray,
         hand: the twin's; its capsules stand for its skin.
         planes: of the object's convex pieces (`envs.signed_distance.hull_planes`).
     """
-    bare = jax.tree.map(jnp.asarray, replace(hand, mesh_vertices=(), mesh_faces=()))
+    bare = jax.tree.map(jnp.asarray, without_meshes(hand))
     residual = jax.jit(partial(_residual, hand=bare, recorded=_rows(recorded), planes=planes))
     slope = jax.jit(jax.jacfwd(residual))
     found = []
@@ -96,7 +94,7 @@ def capsule_gaps(
 
 def last_phalanges(hand: RigidHand) -> list[int]:
     """The capsule of each finger's last link."""
-    return [max(k for k, link in enumerate(hand.capsule_links) if link == tip) for tip in TIP_LINKS]
+    return [last_capsule(hand, tip) for tip in TIP_LINKS]
 
 
 def spin_of(turn: Float[np.ndarray, "3 3"]) -> float:
@@ -109,11 +107,7 @@ def _axes(
     angles: Array | np.ndarray, rotation: Array | np.ndarray, position: Array | np.ndarray, hand: RigidHand
 ) -> Float[Array, "c n 3"]:
     """Points on the capsules' axes in the object's frame (m)."""
-    rot, pos = forward_kinematics(angles, hand)
-    links = jnp.array(hand.capsule_links)
-    ends = pos[links][:, None] + jnp.einsum("cij,cej->cei", rot[links], jnp.asarray(hand.capsule_ends))
-    points = ends[:, :1] + _ALONG[None, :, None] * (ends[:, 1:] - ends[:, :1])
-    return (points - position) @ jnp.asarray(rotation)
+    return (capsule_points(angles, hand, _ALONG) - position) @ jnp.asarray(rotation)
 
 
 def _rows(holding: Holding) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

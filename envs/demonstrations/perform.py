@@ -15,7 +15,7 @@ from mjx_hand.hand.joints import NUM_HINGES
 # What can come of a script; the first is success.
 OUTCOMES = ("held", "diverged", "not lifted", "slipped", "turned in the hand")
 _RISE = 0.06  # m the object must rise
-_SLIP, _SLIP_TURN = 0.01, np.deg2rad(15.0)  # how far it may move in the hand after the lift
+SLIP, SLIP_TURN = 0.01, np.deg2rad(15.0)  # how far it may move in the hand after the lift
 
 
 @dataclasses.dataclass(frozen=True)
@@ -112,5 +112,5 @@ def _outcomes(
         return Rotation.from_matrix(rotation[rows, index]).inv() * quaternion
 
     turn = (orientation(lifted).inv() * orientation(np.full(len(pose), pose.shape[1] - 1))).magnitude()
-    wrong = np.stack([diverged, ~rose, slip >= _SLIP, turn >= _SLIP_TURN], axis=1)
+    wrong = np.stack([diverged, ~rose, slip >= SLIP, turn >= SLIP_TURN], axis=1)
     return np.where(wrong.any(axis=1), 1 + np.argmax(wrong, axis=1), 0)

@@ -13,6 +13,7 @@ from envs.grasps import GraspType, Pads, Wrap
 from envs.signed_distance import half_extents, signed_distance
 from mjx_hand.hand.joints import FINGERS, LINKS, NUM_HINGES
 from mjx_hand.pytree import pytree
+from mjx_hand.rigid.capsules import capsule_points, last_capsule
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics, stack_hands
 from mjx_hand.rotations import exp
@@ -100,24 +101,20 @@ def _solve_all(grasp: GraspType, hands: RigidHand, sizes: Array) -> Posture:
 
 
 def _solve(grasp: GraspType, hand: RigidHand, size: Array) -> Posture:
-    capsule_links = hand.capsule_links
-    capsules = jnp.array([_last_capsule(contact.link, capsule_links) for contact in grasp.contacts])
+    capsules = jnp.array([last_capsule(hand, LINKS.index(contact.link)) for contact in grasp.contacts])
     along = jnp.array([contact.along for contact in grasp.contacts])
     seed_angles, seed_rotation = jnp.array(grasp.posture), jnp.array(grasp.wrist_rotation)
     world_from_object = jnp.array(grasp.object_rotation)
     radius = hand.capsule_radius
     wraps = isinstance(grasp.closing, Wrap)
-    slack = jnp.full(len(capsule_links), 0.0 if wraps else 0.001).at[capsules].set(-_INTO)
+    slack = jnp.full(len(hand.capsule_links), 0.0 if wraps else 0.001).at[capsules].set(-_INTO)
 
     def distance(points: Array) -> Array:
         return signed_distance(grasp.object_kind, size, points @ world_from_object)
 
     def axis_points(x: Array) -> Array:
         """World points on the capsules' axes, (capsules, along, 3)."""
-        rot, pos = forward_kinematics(x[:NUM_HINGES], hand)
-        links = jnp.array(capsule_links)
-        ends = pos[links][:, None] + jnp.einsum("cij,cej->cei", rot[links], hand.capsule_ends)
-        points = ends[:, :1] + _ALONG[None, :, None] * (ends[:, 1:] - ends[:, :1])
+        points = capsule_points(x[:NUM_HINGES], hand, _ALONG)
         return points @ _rotation(x, seed_rotation).T + x[-3:]
 
     def contacts(x: Array) -> Array:
@@ -209,7 +206,3 @@ def _levenberg_marquardt(residual, x):  # type: ignore[no-untyped-def]
 
 def _rotation(x: Array, seed: Array) -> Array:
     return exp(x[NUM_HINGES : NUM_HINGES + 3]) @ seed
-
-
-def _last_capsule(link: str, capsule_links: tuple[int, ...]) -> int:
-    return max(k for k, owner in enumerate(capsule_links) if LINKS[owner] == link)

@@ -33,7 +33,7 @@ from mjx_hand.pytree import replace
 from mjx_hand.retarget.hands import KinematicHands
 from mjx_hand.retarget.options import RetargetOptions
 from mjx_hand.retarget.sequence import retarget_sequence
-from mjx_hand.rigid.rigid_hand import RigidHand, joint_rotations
+from mjx_hand.rigid.rigid_hand import RigidHand, joint_rotations, without_meshes
 
 TRUTH_SCHEMA = "mjx-hand/truth/1"
 _PROJECTION = ("method", "axes", "refine")  # settings that concern the twin, not the recording
@@ -210,7 +210,7 @@ def _true_rotations(trials: Sequence[Trial], hands: Sequence[RigidHand]) -> list
     for trial in trials:
         missing = frames - len(trial.angles)
         angles = np.pad(trial.angles, ((0, missing), (0, 0)), mode="edge").astype(np.float32)
-        hand = replace(hands[trial.person], mesh_vertices=(), mesh_faces=())
+        hand = without_meshes(hands[trial.person])
         out.append(np.asarray(rotate(angles, hand), np.float64)[: len(trial.angles)])
     return out
 

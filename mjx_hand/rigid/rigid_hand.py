@@ -124,8 +124,13 @@ def tip_positions(
     return link_position[..., tips, :] + reach
 
 
+def without_meshes(rigid: RigidHand) -> RigidHand:
+    """The hand without what only pictures need, so that it passes into compiled functions at no cost."""
+    return replace(rigid, mesh_vertices=(), mesh_faces=())
+
+
 def stack_hands(hands: Sequence[RigidHand]) -> RigidHand:
     """Hands of one structure as one `RigidHand` with a leading axis, to `vmap` over; float32, without their meshes."""
     first = hands[0]
-    bare = [replace(h, mesh_vertices=(), mesh_faces=(), name=first.name) for h in hands]
+    bare = [replace(without_meshes(h), name=first.name) for h in hands]
     return jax.tree.map(lambda *rows: jnp.asarray(np.stack(rows), jnp.float32), *bare)
