@@ -84,7 +84,7 @@ def make_reference(
     features = [[*d.object.size, d.object.mass, d.object.friction, *_one_of_kinds(d)] for d in demonstrations]
     return Reference(
         targets=targets,
-        controls=_anticipated(targets, gains, demonstrations[0].motion.fps) + grip,
+        controls=anticipated(targets, gains, demonstrations[0].motion.fps) + grip,
         grip=grip,
         object_pose=jnp.asarray(np.stack(poses), jnp.float32),
         base=jnp.asarray(np.stack(bases), jnp.float32),
@@ -99,6 +99,18 @@ def object_in_hand(demonstration: Demonstration) -> tuple[Float[np.ndarray, "t 3
     thing = Rotation.from_quat(demonstration.object_pose[:, 3:], scalar_first=True)
     offset = demonstration.object_pose[:, :3] - demonstration.motion.wrist_position
     return (wrist * thing).as_matrix(), wrist.apply(offset)
+
+
+def anticipated(targets: Float[Array, "d t 26"], gains: Gains, fps: float) -> Float[Array, "d t 26"]:
+    """Targets led by the controllers' lag times the targets' speed.
+
+    A position controller with damping follows a moving target kv/kp seconds late. A frame's target is commanded for the
+    whole step that ends at that frame, half a step early on average, which makes up for part of it.
+    """
+    kp = np.concatenate([[gains.wrist_slide[0]] * 3, [gains.wrist_turn[0]] * 3, gains.stiffness])
+    kv = np.concatenate([[gains.wrist_slide[1]] * 3, [gains.wrist_turn[1]] * 3, gains.damping])
+    speed = jnp.asarray(jnp.gradient(targets, 1 / fps, axis=1))
+    return targets + jnp.asarray(kv / kp - 0.5 / fps, jnp.float32) * speed
 
 
 def _grips(
@@ -138,18 +150,6 @@ def _grip_forces(demonstrations: Sequence[Demonstration], grip_force: float | No
 
 def _one_of_kinds(demonstration: Demonstration) -> list[float]:
     return [float(demonstration.object.kind == kind) for kind in OBJECT_KINDS]
-
-
-def _anticipated(targets: Float[Array, "d t 26"], gains: Gains, fps: float) -> Float[Array, "d t 26"]:
-    """Targets led by the controllers' lag times the targets' speed.
-
-    A position controller with damping follows a moving target kv/kp seconds late. A frame's target is commanded for the
-    whole step that ends at that frame, half a step early on average, which makes up for part of it.
-    """
-    kp = np.concatenate([[gains.wrist_slide[0]] * 3, [gains.wrist_turn[0]] * 3, gains.stiffness])
-    kv = np.concatenate([[gains.wrist_slide[1]] * 3, [gains.wrist_turn[1]] * 3, gains.damping])
-    speed = jnp.asarray(jnp.gradient(targets, 1 / fps, axis=1))
-    return targets + jnp.asarray(kv / kp - 0.5 / fps, jnp.float32) * speed
 
 
 def _padded(rows: np.ndarray, frames: int) -> np.ndarray:

@@ -36,7 +36,7 @@ def assisted_replay(
     controls = np.clip(np.asarray(reference.controls, float), low, high)
     speed = _object_speed(pose, models[0].opt.timestep * substeps)
 
-    heavy = gauss_seidel([_with_heavy_object(model) for model in models])  # the friction that episodes will have
+    heavy = gauss_seidel([with_heavy_object(model) for model in models])  # the friction that episodes will have
     worlds = batch.Batch(heavy[0], nsim=count)
     worlds.set_models(heavy)
     qpos = np.zeros((count, frames, models[0].nq))
@@ -52,7 +52,7 @@ def assisted_replay(
     return qpos, qvel, controls
 
 
-def _with_heavy_object(model: mujoco.MjModel) -> mujoco.MjModel:
+def with_heavy_object(model: mujoco.MjModel) -> mujoco.MjModel:
     """A copy in which fingers cannot push the object away or sink into it while it is carried."""
     heavy = copy.copy(model)
     thing = heavy.body(OBJECT).id

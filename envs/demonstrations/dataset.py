@@ -200,15 +200,7 @@ def _project_again(settings: SetSettings, usual: Path, folder: Path, report: Rep
 def _make_variations(settings: SetSettings, folder: Path, report: Report) -> Mapping[str, Mapping[str, int]]:
     """Make both parts from a recording; what they hold."""
     given, made = settings.recording, 0
-    report("reading the recording", 0.0)
-    recorded = read_demonstration(
-        given.path,
-        mass=given.mass,
-        friction=given.friction,
-        pieces=given.pieces,
-        rate=given.rate,
-        cutoff=given.cutoff,
-    )
+    recorded = read_demonstration(given, report)
     for offset, (part, count) in enumerate(zip(PARTS, (given.train, given.heldout), strict=True)):
         rng = np.random.default_rng(settings.seed + offset * _APART)
         (folder / part).mkdir()

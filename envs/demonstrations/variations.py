@@ -25,6 +25,7 @@ class RecordingSettings:
         train, heldout: demonstrations in each part. The first held-out one is the recording itself, not varied.
         mass, friction: of the object as it was recorded (kg).
         masses, frictions: between which variations draw them.
+        force: with which the hand must be able to hold the heaviest and most slippery of these (N).
         speeds: between which the pace is drawn, as a multiple of the recorded one.
         wrist_error: standard deviation of the wrist's slow error, m; of its orientation, ten times as many rad.
         angle_error: of the hinges' slow error, rad.
@@ -41,6 +42,7 @@ class RecordingSettings:
     friction: float = 0.8
     masses: tuple[float, float] = (0.3, 0.65)
     frictions: tuple[float, float] = (0.7, 1.0)
+    force: float = 32.0
     speeds: tuple[float, float] = (0.9, 1.1)
     wrist_error: float = 0.001
     angle_error: float = 0.02
@@ -53,7 +55,7 @@ class RecordingSettings:
         for name in ("train", "heldout", "pieces"):
             if getattr(self, name) < 1:
                 raise InputError(f"data.recording.{name} is {getattr(self, name)}; it must be at least 1")
-        for name in ("mass", "friction", "rate", "cutoff"):
+        for name in ("mass", "friction", "force", "rate", "cutoff"):
             if not 0 < getattr(self, name) < math.inf:
                 raise InputError(f"data.recording.{name} is {getattr(self, name)}; it must be a positive number")
         for name in ("masses", "frictions", "speeds"):
