@@ -115,13 +115,12 @@ class Carrying:
             for position, rotation in zip(way.wrist_position, way.wrist_rotation, strict=True)
         ]
         targets = np.concatenate([np.stack(turns), way.angles], axis=2)
-        # Before the fingers close they are off the object, and after it the holding stays as it is.
-        span = slice(act.closing, act.closed + 1)
-        rows = (way.angles[:, span], *(part[:, span] for part in way.in_hand))
+        until = act.closed + 1  # the holding stays as it is from then on, and so does the grip
+        rows = (way.angles[:, :until], *(part[:, :until] for part in way.in_hand))
         grip = np.asarray(self._grips(*(jnp.asarray(row, jnp.float32) for row in rows)), float)
-        whole = np.zeros_like(targets)
-        whole[:, span, NUM_WRIST:], whole[:, act.closed + 1 :, NUM_WRIST:] = grip, grip[:, -1:]
-        controls = np.asarray(anticipated(jnp.asarray(targets, jnp.float32), self.gains, self.fps), float) + whole
+        controls = np.array(anticipated(jnp.asarray(targets, jnp.float32), self.gains, self.fps), float)
+        controls[:, :until, NUM_WRIST:] += grip
+        controls[:, until:, NUM_WRIST:] += grip[:, -1:]
         low, high = self.model.actuator_ctrlrange.T
         place = np.broadcast_to(way.position, (*targets.shape[:2], 3))
         turned = Rotation.from_matrix(way.rotation.reshape(-1, 3, 3)).as_quat(scalar_first=True)

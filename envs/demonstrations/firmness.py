@@ -55,13 +55,6 @@ def firmest(
         carried = carrying.carry(now, fixed=generation < _FIXED)
         order = np.argsort(_cost(now, carried, act), kind="stable")[: round(_KEPT * tried)]
         best = float(carried.kept[order[0]])
-        print(
-            generation,
-            np.round(carried.kept[order[:6]], 2),
-            np.round(1000 * carried.error[order[:4]], 1),
-            np.mean(carried.kept == 1),
-            flush=True,
-        )  # TMP
         if generation >= _FEWEST and best == 1.0:
             return now[int(order[0])]
         parents = rng.choice(order, tried - len(order))

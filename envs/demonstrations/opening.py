@@ -33,7 +33,7 @@ def _open_all(
             short = jnp.where(fingers, jnp.maximum(clearance - gaps, 0.0), 0.0)
             return short, short
 
-        def step(_: int, q: Array) -> Array:
+        def step(_: Array, q: Array) -> Array:
             slope, short = jax.jacfwd(missing, has_aux=True)(q)
             square = slope @ slope.T + _DAMPING**2 * jnp.eye(len(short))
             moved = q - _STEP * slope.T @ jnp.linalg.solve(square, short)

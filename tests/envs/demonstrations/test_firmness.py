@@ -35,27 +35,28 @@ FORCE = 8.0
 
 @pytest.fixture(scope="module")
 def act() -> Act:
-    """A hand comes from above to a cube on the table and lifts it by 6 cm; captured 1 cm beside where it was."""
+    """An open hand comes from above to a cube on the table and lifts it by 6 cm; captured 1 cm beside where it was."""
     hand = build_rigid_hand(load_hand())
     corners = HALF * np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
     thing = ObjectDescription(kind="mesh", size=np.full(3, HALF), mass=0.1, friction=0.9, hulls=corners[None])
     posture = solve_postures(grasp_type("pinch"), [hand], np.full((1, 3), HALF))
-    rotation, angles = np.asarray(posture.rotation[0], float), np.asarray(posture.angles[0], float)
+    rotation = Rotation.from_matrix(np.asarray(posture.rotation[0], float)).as_matrix()
+    angles = np.asarray(posture.angles[0], float)
     grasp = np.asarray(posture.position[0], float)
     times = np.arange(FRAMES) / FPS
     height = HALF + 0.06 * np.clip((times - LIFTED) / 0.4, 0.0, 1.0)
     away = 0.1 * np.clip(1.0 - times, 0.0, 1.0)  # the reach
     position = np.stack([0 * times, 0 * times, height], axis=1)
     beside = rotation @ [0.0, 0.01, 0.0]
+    held = Holding(angles=angles, rotation=rotation.T, position=rotation.T @ -(grasp + beside))
     seen = Seen(
         times=times,
-        angles=np.tile(angles, (FRAMES, 1)),
+        angles=np.tile(opened(held[None], hand, hull_planes(thing.hulls), 0.03).angles, (FRAMES, 1)),
         hand_rotation=np.tile(rotation, (FRAMES, 1, 1)),
         hand_position=position + grasp + beside + away[:, None] * [0.0, 0.0, 1.0],
         rotation=np.tile(np.eye(3), (FRAMES, 1, 1)),
         position=position,
     )
-    held = Holding(angles=angles, rotation=rotation.T, position=rotation.T @ -(grasp + beside))
     return Act(seen=seen, lifted=LIFTED, held=held, hand=hand, thing=thing)
 
 
