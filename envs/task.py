@@ -29,8 +29,6 @@ class Task:
         assist_until: share of the training over which it fades to nothing, linearly.
         mid_start: share of training episodes that start in the middle of a demonstration, at a state from its own
             assisted replay (reference-state initialisation); the rest start at frame 0.
-        linger: how long a training episode goes on after the demonstration's end, its last frame held (s); without it
-            no policy is ever told to keep what it holds.
         grip_force: force (N) with which the reference presses fingers that touch; 0 leaves demonstrations as they are,
             null takes that of each demonstration's grasp type.
         ahead: how many frames ahead the policy sees the reference.
@@ -49,7 +47,6 @@ class Task:
     assist: float = 0.0
     assist_until: float = 0.5
     mid_start: float = 0.7
-    linger: float = 0.0
     grip_force: float | None = None
     ahead: tuple[int, ...] = (1, 4, 12)
 
@@ -68,13 +65,9 @@ class Task:
             raise InputError(
                 f"task.assist is {self.assist}; it must lie between 0 and {_STIFFEST:g}, more shakes the object"
             )
-        for name, value in (
-            ("action_cost", self.action_cost),
-            ("linger", self.linger),
-            ("grip_force", self.grip_force or 0.0),
-        ):
-            if not 0 <= value < math.inf:
-                raise InputError(f"task.{name} is {value}; it must be 0 or a positive number")
+        for name, value in (("action_cost", self.action_cost), ("grip_force", self.grip_force or 0.0)):
+            if not value >= 0:
+                raise InputError(f"task.{name} is {value}; it must not be negative")
         if not self.ahead or any(k < 1 for k in self.ahead):
             raise InputError(
                 f"task.ahead is {self.ahead}; it must list frames ahead, each at least 1, such as [1,4,12]"

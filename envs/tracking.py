@@ -25,7 +25,7 @@ from envs.task import Task
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.motion.demonstration import Demonstration
-from mjx_hand.pytree import pytree, replace
+from mjx_hand.pytree import pytree
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand, without_meshes
 from mjx_hand.rotations import quaternion_difference
@@ -35,15 +35,11 @@ _TAIL = 10  # no episode starts in a demonstration's last frames, where nothing 
 
 @pytree
 class Twin:
-    """A world's state: physics, which demonstration it follows, how far it is, and the residual so far.
-
-    `lingered` counts the control steps for which the last frame has been held.
-    """
+    """A world's state: physics, which demonstration it follows, how far it is, and the residual so far."""
 
     physics: PhysicsState
     demonstration: Int[Array, "*b"]
     frame: Int[Array, "*b"]
-    lingered: Int[Array, "*b"]
     residual: Float[Array, "*b 26"]
 
 
@@ -126,7 +122,6 @@ class TrackingEnv(Env):
             physics=physics,
             demonstration=jnp.asarray(demonstration, jnp.int32),
             frame=jnp.asarray(frame, jnp.int32),
-            lingered=jnp.zeros((), jnp.int32),
             residual=jnp.zeros(self.action_size),
         )
         zero = jnp.zeros(())
@@ -136,8 +131,6 @@ class TrackingEnv(Env):
 
     def step(self, state: State, action: Float[Array, "26"]) -> State:
         """One control step towards the next frame of the demonstration; past its end the last frame is held.
-
-        An episode is over when that has lasted for `task.linger`.
 
         `state.info["progress"]` is the share of the training that is over; 1, without help for the object, unless the
         learner says otherwise.
@@ -149,8 +142,7 @@ class TrackingEnv(Env):
         if self.assisted:
             targets = jnp.concatenate([targets, self._assistance(twin, frame, progress)])
         physics = self.engine.step(twin.physics, targets)
-        lingered = jnp.where(frame == twin.frame, twin.lingered + 1, 0)
-        twin = replace(twin, physics=physics, frame=frame, lingered=lingered, residual=residual)
+        twin = Twin(physics=physics, demonstration=twin.demonstration, frame=frame, residual=residual)
 
         position, rotation = self._errors(twin)
         terms = {
@@ -159,8 +151,7 @@ class TrackingEnv(Env):
             "reward/action": -task.action_cost * jnp.sum(action**2),
         }
         done = jnp.maximum((position > task.lost_distance(progress)).astype(jnp.float32), physics.unstable)
-        last = frame >= self.reference.length[twin.demonstration] - 1
-        finished = (last & (lingered >= round(task.linger * self.fps))).astype(jnp.float32)
+        finished = (frame >= self.reference.length[twin.demonstration] - 1).astype(jnp.float32)
         metrics = {**terms, "error/position": position, "error/rotation": rotation, "unstable": physics.unstable}
         info = {**state.info, "truncation": finished * (1 - done)}
         return state.replace(  # type: ignore[attr-defined]

@@ -80,19 +80,6 @@ def test_the_end_truncates_and_holds_the_last_frame(env, start, step):
     assert truncated == [0, 1, 1, 1]
 
 
-def test_an_episode_lingers_past_the_end_for_as_long_as_asked(demonstrations, hands):
-    env = TrackingEnv(demonstrations[:1], hands[:1], engine="native", task=Task(linger=0.06))  # three control steps
-    state, step = env.start(jnp.int32(0), env.reference.length[0] - 3), jax.jit(env.step)
-    done, waited = [], []
-    for _ in range(6):
-        state = step(state, jnp.zeros(26))
-        done.append(float(state.done))
-        waited.append(int(state.pipeline_state.lingered))
-    assert waited == [0, 0, 1, 2, 3, 4]
-    assert done == [0, 0, 0, 0, 1, 1]
-    assert float(state.info["truncation"]) == 1
-
-
 def test_losing_the_object_ends_a_rollout_and_is_no_truncation(env, start, step):
     """The state of another demonstration's middle, told that it is at this one's start: the object is far away."""
     state = at(start, 0, 0)
