@@ -3,7 +3,6 @@
 import dataclasses
 import itertools
 
-import mujoco
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -16,9 +15,6 @@ from envs.demonstrations.posture import solve_postures
 from envs.demonstrations.seen import Seen
 from envs.demonstrations.taking import Act, take
 from envs.grasps import grasp_type
-from envs.physics.solver import gauss_seidel
-from envs.reference import make_reference
-from envs.scene import demonstration_model
 from envs.signed_distance import hull_planes
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
@@ -27,7 +23,7 @@ from mjx_hand.motion.joint_motion import JointMotion
 from mjx_hand.motion.resample import matrix_quaternions
 from mjx_hand.pytree import replace
 from mjx_hand.rigid.build import build_rigid_hand
-from mjx_hand.rigid.gains import Gains
+from tests.envs.demonstrations.unaided import unaided
 
 HALF, FPS, FRAMES, LIFTED = 0.017, 50.0, 110, 1.6
 FORCE = 8.0
@@ -126,14 +122,7 @@ def test_a_holding_is_found_that_carries_the_object_in_a_demonstration(act):
         shape=np.zeros(10),
         grasp="recorded",
     )
-    reference = make_reference([demonstration], [act.hand], grip_force=FORCE, gains=Gains())
-    (model,) = gauss_seidel([demonstration_model(demonstration, act.hand)])
-    data = mujoco.MjData(model)
-    data.qpos[:] = np.concatenate([reference.targets[0, 0], demonstration.object_pose[0]])
-    for controls in np.asarray(reference.controls)[0, 1:]:
-        data.ctrl[:] = np.clip(controls, *model.actuator_ctrlrange.T)
-        mujoco.mj_step(model, data, 5)
-    thing = data.qpos[-7:]
+    thing = unaided(demonstration, act.hand, FORCE)[-1]
     assert np.linalg.norm(thing[:3] - demonstration.object_pose[-1, :3]) < 0.015
     turn = Rotation.from_quat(thing[3:], scalar_first=True).magnitude()
     assert turn < np.deg2rad(30)

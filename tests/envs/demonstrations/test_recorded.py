@@ -7,13 +7,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from envs.demonstrations.dataset import SetSettings, set_folder
+from envs.demonstrations.contacts import demonstration_gaps
+from envs.demonstrations.dataset import SetSettings, set_folder, twins
+from envs.demonstrations.holding import last_phalanges
+from envs.demonstrations.recorded import read_demonstration
 from envs.demonstrations.standing import find_table, world_from_recording
 from envs.demonstrations.variations import RecordingSettings, vary
 from mjx_hand.capture.datasets.dexmv_object import RecordedObject, load_object, recording_files
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import Demonstration, ObjectDescription
 from mjx_hand.motion.joint_motion import JointMotion
+from tests.envs.demonstrations.unaided import unaided
 
 FOLDER = Path(__file__).resolve().parents[4] / "shared/data/dexmv_mustard"
 CUBE = np.array([[x, y, z] for x in (-0.03, 0.03) for y in (-0.03, 0.03) for z in (-0.05, 0.05)])
@@ -118,3 +122,23 @@ def test_the_real_bottle_stands_and_is_lifted():
     assert np.abs(np.median(lowest[: table.standing])) < 0.005
     assert lowest[table.lifted :].min() > -0.005
     assert 0.1 < lowest.max() < 0.2
+
+
+@pytest.mark.slow
+def test_the_real_recording_becomes_a_demonstration_that_the_engine_carries():
+    """With the force that its grasp was found with, from the first frame; with a quarter of it, it is not."""
+    if not FOLDER.is_dir():
+        pytest.skip(f"{FOLDER} is absent: the recording is not part of the project")
+    settings = RecordingSettings(path=str(FOLDER), mass=0.603)
+    demonstration = read_demonstration(settings)
+    (hand,) = twins([demonstration])
+    gaps, height = demonstration_gaps(demonstration, hand), demonstration.object_pose[:, 2]
+    assert gaps.min() > -0.006
+    assert np.abs(gaps[height > height[0] + 0.02][:, last_phalanges(hand)]).mean() < 0.004
+
+    def error(force: float) -> float:
+        poses = unaided(demonstration, hand, force)
+        return float(np.linalg.norm(poses[:, :3] - demonstration.object_pose[:, :3], axis=1).mean())
+
+    assert error(settings.force) < 0.01
+    assert error(8.0) > 0.05
