@@ -16,7 +16,6 @@ from envs.physics.solver import gauss_seidel
 from envs.reference import anticipated
 from envs.replay import with_heavy_object
 from envs.scene import NUM_WRIST, TIMESTEP, scene_model, wrist_coordinates
-from envs.signed_distance import hull_planes
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.motion.resample import matrix_quaternions
 from mjx_hand.rigid.gains import Gains
@@ -61,11 +60,9 @@ class Carrying:
         model = scene_model(act.hand, thing, _NO_BOXES, _NO_BOXES, self.base, gains=self.gains)
         (self.model,) = gauss_seidel([model])
         self.heavy = with_heavy_object(self.model)
-        self.worlds = batch.Batch(self.model, nsim=self.count)
-        for field in ("qpos", "qvel", "ctrl"):
-            self.worlds.bind(field)
+        self.worlds = batch.Batch(self.model, nsim=count)
         bare = jax.tree.map(jnp.asarray, without_meshes(act.hand))
-        planes = jnp.asarray(hull_planes(thing.hulls), jnp.float32)
+        planes = jnp.asarray(act.planes, jnp.float32)
 
         @jax.jit
         def grips(angles: Array, rotation: Array, position: Array) -> Array:

@@ -15,7 +15,6 @@ from envs.demonstrations.carrying import Carried, Carrying
 from envs.demonstrations.holding import Holding, chosen, joined, unlikeliness
 from envs.demonstrations.opening import opened
 from envs.demonstrations.taking import Act
-from envs.signed_distance import hull_planes
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
 
@@ -37,7 +36,7 @@ def firmest(
     """The holding near the recorded one that carries the object all the way, nearest to its way and to the recording.
 
     Args:
-        act: what was recorded; its object as heavy and as slippery as the hand must be able to hold it.
+        act: what was recorded.
         candidates: n, where to begin.
         force: with which the hand presses (N).
         report: told what is going on and how far it is.
@@ -69,7 +68,7 @@ def firmest(
 
 
 def _cost(holdings: Holding, carried: Carried, act: Act) -> Float[np.ndarray, "n"]:
-    unlikely = unlikeliness(holdings, act.held, act.hand, hull_planes(act.thing.hulls))
+    unlikely = unlikeliness(holdings, act.held, act.hand, act.planes)
     return 1 - carried.kept + _OFF_WAY * carried.error + _UNLIKELY * unlikely
 
 
@@ -83,4 +82,4 @@ def _changed(holdings: Holding, act: Act, scale: Float[np.ndarray, "n"], rng: np
         rotation=(Rotation.from_matrix(holdings.rotation) * turn).as_matrix(),
         position=holdings.position + scale * _PLACE * rng.normal(size=(count, 3)),
     )
-    return opened(changed, act.hand, hull_planes(act.thing.hulls), 0.0)
+    return opened(changed, act.hand, act.planes, 0.0)

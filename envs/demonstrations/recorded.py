@@ -19,7 +19,6 @@ from envs.demonstrations.seen import beginning, in_world, mended, resampled
 from envs.demonstrations.standing import find_table, world_from_recording
 from envs.demonstrations.taking import Act, take
 from envs.demonstrations.variations import RecordingSettings
-from envs.signed_distance import hull_planes
 from mjx_hand.capture.datasets.dexmv_object import RecordedObject, load_object, recording_files
 from mjx_hand.capture.keypoints.bone_lengths import lengths, shape_of_lengths
 from mjx_hand.capture.keypoints.layouts import hand_keypoints
@@ -70,7 +69,7 @@ def read_demonstration(
     seen.position[:, 2] += np.maximum(-lowest, 0.0)  # the filter rounds off how the object leaves the table
 
     act = Act(seen=seen, lifted=table.lifted / motion.fps, held=held, hand=hand, thing=description)
-    candidates = solve_holdings(held, hand, hull_planes(description.hulls))
+    candidates = solve_holdings(held, hand, act.planes)
     way = take(act, firmest(act, candidates, settings.force, report)[None])
     source = f"{motion.source} with {mesh.name}"
     return Demonstration(

@@ -7,6 +7,12 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation, Slerp
 
 
+def minimum_jerk(s: Float[np.ndarray, "t"]) -> Float[np.ndarray, "t"]:
+    """How far a hand is after a share s of a movement's time: 0 before, 1 after (Flash and Hogan 1985)."""
+    s = np.clip(s, 0.0, 1.0)
+    return s**3 * (10 - 15 * s + 6 * s**2)
+
+
 @dataclasses.dataclass(frozen=True)
 class Tempo:
     """Durations (s) of the phases of a grasp."""
@@ -30,10 +36,9 @@ class Tempo:
         return sum(dataclasses.astuple(self)[: names.index(phase) + 1])
 
     def progress(self, phase: str, time: Float[np.ndarray, "t"]) -> Float[np.ndarray, "t"]:
-        """0 before the phase, 1 after it, minimum jerk (Flash and Hogan 1985) in between."""
+        """0 before the phase, 1 after it, minimum jerk in between."""
         length = getattr(self, phase)
-        s = np.clip((time - self.end(phase) + length) / length, 0.0, 1.0)
-        return s**3 * (10 - 15 * s + 6 * s**2)
+        return minimum_jerk((time - self.end(phase) + length) / length)
 
 
 @dataclasses.dataclass(frozen=True)

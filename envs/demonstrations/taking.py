@@ -5,6 +5,7 @@ object's way, and with it the hand's from then on, are the recording's.
 """
 
 import dataclasses
+import functools
 
 import numpy as np
 from jaxtyping import Float
@@ -12,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.holding import Holding, spin_of
 from envs.demonstrations.opening import opened
+from envs.demonstrations.script import minimum_jerk
 from envs.demonstrations.seen import Seen
 from envs.signed_distance import hull_planes
 from mjx_hand.motion.demonstration import ObjectDescription
@@ -41,6 +43,11 @@ class Act:
     hand: RigidHand
     thing: ObjectDescription
 
+    @functools.cached_property
+    def planes(self) -> Float[np.ndarray, "h f 4"]:
+        """Of the object's convex pieces (`envs.signed_distance.hull_planes`)."""
+        return hull_planes(self.thing.hulls)
+
     @property
     def closed(self) -> int:
         """The first frame in which the fingers are closed; object and hand are as in the holding from then on."""
@@ -54,8 +61,7 @@ class Act:
     def _share(self, between: tuple[float, float]) -> Float[np.ndarray, "t"]:
         """0 before, 1 after, minimum jerk between."""
         begin, end = between
-        s = np.clip((self.seen.times - self.lifted + begin) / (begin - end), 0.0, 1.0)
-        return s**3 * (10 - 15 * s + 6 * s**2)
+        return minimum_jerk((self.seen.times - self.lifted + begin) / (begin - end))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -91,7 +97,7 @@ def take(act: Act, holdings: Holding) -> Taking:
     rotation = seen.rotation @ spun[:, None]
     wrist_rotation = rotation @ np.swapaxes(holdings.rotation, 1, 2)[:, None]
     wrist_position = seen.position - np.einsum("ntij,nj->nti", wrist_rotation, holdings.position)
-    spread = opened(holdings, hand, hull_planes(act.thing.hulls), _CLEAR).angles[:, None]
+    spread = opened(holdings, hand, act.planes, _CLEAR).angles[:, None]
     angles = seen.angles + arriving * (spread - seen.angles) + closing * (holdings.angles[:, None] - spread)
     return Taking(
         angles=np.clip(angles, hand.hinge_lower, hand.hinge_upper),

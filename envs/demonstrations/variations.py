@@ -25,7 +25,7 @@ class RecordingSettings:
         train, heldout: demonstrations in each part. The first held-out one is the recording itself, not varied.
         mass, friction: of the object as it was recorded (kg).
         masses, frictions: between which variations draw them.
-        force: with which the hand must be able to hold the heaviest and most slippery of these (N).
+        force: with which the hand must be able to carry the object as it was recorded (N).
         speeds: between which the pace is drawn, as a multiple of the recorded one.
         wrist_error: standard deviation of the wrist's slow error, m; of its orientation, ten times as many rad.
         angle_error: of the hinges' slow error, rad.
