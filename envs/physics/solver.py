@@ -1,7 +1,7 @@
 """Solver settings, chosen by measurement (`python -m train.benchmark solver`).
 
-Contacts have elliptic cones with impratio 10 everywhere: at 1 no pinch holds, and pyramidal cones lose half of them
-(19 of 40 held against 38 of 40, same scripts).
+Contacts have elliptic cones with impratio 50 everywhere: at 1 no pinch holds, at 10 a held ball creeps out of the
+fingers at 2 to 3 mm/s, and pyramidal cones lose half of the pinches (19 of 40 held against 38 of 40, same scripts).
 """
 
 import copy
@@ -18,10 +18,10 @@ def newton(models: Sequence[mujoco.MjModel]) -> list[mujoco.MjModel]:
 def gauss_seidel(models: Sequence[mujoco.MjModel]) -> list[mujoco.MjModel]:
     """Copies for MuJoCo's C engine: projected Gauss-Seidel on the few forces of a grasp.
 
-    20 sweeps hold and drop the same objects as Newton's method, and under training's commands, which jump every 20 ms
+    15 sweeps hold and drop the same objects as Newton's method, and under training's commands, which jump every 20 ms
     by random residuals, step up to twice as fast; under smooth ones they are no faster (`docs/physics.md`).
     """
-    return _set(models, mujoco.mjtSolver.mjSOL_PGS, iterations=20)
+    return _set(models, mujoco.mjtSolver.mjSOL_PGS, iterations=15)
 
 
 def _set(models: Sequence[mujoco.MjModel], solver: mujoco.mjtSolver, iterations: int) -> list[mujoco.MjModel]:
@@ -31,5 +31,5 @@ def _set(models: Sequence[mujoco.MjModel], solver: mujoco.mjtSolver, iterations:
         model.opt.iterations = iterations
         model.opt.ls_iterations = 20
         model.opt.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-        model.opt.impratio = 10.0
+        model.opt.impratio = 50.0
     return copies

@@ -67,22 +67,25 @@ def _conjugate(iterations: int) -> Settings:
     return Settings({"solver": _SOLVER.mjSOL_CG, "iterations": iterations, "jacobian": _SPARSE})
 
 
-CHOSEN = "as chosen: PGS 20, elliptic, impratio 10, 4 ms, solref 10 ms"
+CHOSEN = "as chosen: PGS 15, elliptic, impratio 50, 4 ms, solref 10 ms"
 SWEEP = {
     CHOSEN: Settings(),
     "PGS 10": Settings({"iterations": 10}),
+    "PGS 20": Settings({"iterations": 20}),
     "PGS 30": Settings({"iterations": 30}),
-    "PGS 20, sparse": Settings({"jacobian": _SPARSE}),
+    "PGS 15, sparse": Settings({"jacobian": _SPARSE}),
     "Newton 10, dense": _newton(10, _DENSE),
     "Newton 10, sparse": _newton(10),
     "Newton 100, dense": _newton(100, _DENSE),
     "Newton 100, sparse": _newton(100),
     "CG 20, sparse": _conjugate(20),
     "CG 50, sparse": _conjugate(50),
-    "PGS 20, pyramidal": Settings({"cone": _PYRAMIDS}),
+    "PGS 15, pyramidal": Settings({"cone": _PYRAMIDS}),
     "Newton 10, sparse, pyramidal": _newton(10, cone=_PYRAMIDS),
     "impratio 1": Settings({"impratio": 1.0}),
     "impratio 3": Settings({"impratio": 3.0}),
+    "impratio 10": Settings({"impratio": 10.0}),
+    "impratio 200": Settings({"impratio": 200.0}),
     "2 ms": Settings({"timestep": 0.002}),
     "5 ms": Settings({"timestep": 0.005}),
     "solref 20 ms": Settings(solref=0.02),
