@@ -11,7 +11,10 @@ import mujoco
 
 
 def newton(models: Sequence[mujoco.MjModel]) -> list[mujoco.MjModel]:
-    """Copies for engines that have Newton's method alone; it stops early, so its caps are cheap."""
+    """Copies for engines that have Newton's method alone; it stops early, so its caps are cheap.
+
+    Line searches of 20 steps and not 50 end before their minimum: objects that stand on a table slide by centimetres.
+    """
     return _set(models, mujoco.mjtSolver.mjSOL_NEWTON, iterations=10)
 
 
@@ -29,7 +32,7 @@ def _set(models: Sequence[mujoco.MjModel], solver: mujoco.mjtSolver, iterations:
     for model in copies:
         model.opt.solver = solver
         model.opt.iterations = iterations
-        model.opt.ls_iterations = 20
+        model.opt.ls_iterations = 50
         model.opt.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
         model.opt.impratio = 50.0
     return copies
