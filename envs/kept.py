@@ -1,6 +1,7 @@
 """Arrays that take seconds to compute, kept beside compiled functions from one start of a program to the next."""
 
 import contextlib
+import functools
 import hashlib
 import inspect
 import os
@@ -18,7 +19,7 @@ from mjx_hand.motion.archive import load_arrays, save_arrays
 
 SCHEMA = "mjx-hand/kept/1"
 _FOLDER = "arrays"
-_MOST = 40  # files; those that were used longest ago are deleted
+_MOST = 60  # files; those that were used longest ago are deleted
 _CODE = (Path(inspect.getfile(InputError)).parent, Path(__file__).parent)  # all: what matters is too easily missed
 _LIBRARIES = ("jax", "jaxlib", "mujoco", "numpy", "scipy")
 
@@ -68,14 +69,22 @@ def model_bytes(model: mujoco.MjModel) -> bytes:
     return content.tobytes()
 
 
-def _digest(ingredients: Any) -> str:
+@functools.cache
+def _code() -> bytes:
+    """A digest of the code as this process found it."""
     content = hashlib.sha256()
-    for library in _LIBRARIES:
-        content.update(f"{library} {version(library)} ".encode())
     for root in _CODE:
         for source in sorted(root.rglob("*.py")):
             content.update(str(source.relative_to(root)).encode())
             content.update(source.read_bytes())
+    return content.digest()
+
+
+def _digest(ingredients: Any) -> str:
+    content = hashlib.sha256()
+    for library in _LIBRARIES:
+        content.update(f"{library} {version(library)} ".encode())
+    content.update(_code())
     leaves, structure = jax.tree.flatten(ingredients)
     content.update(f"{jax.default_backend()} {structure}".encode())
     for leaf in leaves:

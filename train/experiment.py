@@ -4,7 +4,8 @@ import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 
-from envs.demonstrations.dataset import load_part, make_set, twins
+from envs.demonstrations.dataset import load_part, make_set
+from envs.demonstrations.twin_hands import twins
 from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import Demonstration

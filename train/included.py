@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from envs.demonstrations.dataset import twins
+from envs.demonstrations.twin_hands import twins
 from envs.evaluation import evaluate
 from envs.rolling import make_roll_out
 from envs.tracking import TrackingEnv

@@ -24,7 +24,7 @@ from train.checkpoint import Checkpoint, save_checkpoint
 from train.config import Config
 from train.experiment import World, make_world
 from train.interruption import interruptions
-from train.learner import Learner, LearnerState
+from train.learner import Learner, LearnerState, Networks
 from train.policy import deterministic_policy
 from train.processes import agreed, first_alone_speaks, gathered, is_first, join
 from train.run_folder import RunFolder
@@ -60,7 +60,8 @@ def train(config: Config, world: World | None = None) -> list[Point]:
     folder = RunFolder(config)
     world = make_world(config, "train") if world is None else world
     learner = Learner(ParallelEnv(world.env, guard=config.debug.nan_guard), config.ppo)
-    run = _Run(config, world, learner, folder, *_start(config, learner, folder))
+    state, points, seconds = _start(config, learner, folder)
+    run = _Run(config, world, learner, folder, state, points, seconds)
     if run.finished:
         print(f"{config.name!r} is trained already ({folder.path}); train it anew with fresh=true")
         return run.points
@@ -69,7 +70,7 @@ def train(config: Config, world: World | None = None) -> list[Point]:
         f"{config.ppo.num_envs} worlds; results in {folder.path}",
         flush=True,
     )
-    if run.points:
+    if seconds:
         print(f"going on from {run.steps:,} steps", flush=True)
     with interruptions() as asked:
         stopped = run.until_finished(asked)
@@ -122,9 +123,10 @@ class _Run:
 
     @property
     def finished(self) -> bool:
-        if not self.points or self.points[-1].steps != self.steps:
+        if not self.points:
             return False
-        return self.updates >= self.last or self.points[-1].success >= self.config.checks.stop_at
+        last = self.points[-1]
+        return last.success >= self.config.checks.stop_at or (self.updates >= self.last and last.steps == self.steps)
 
     def until_finished(self, asked: Callable[[], int]) -> int:
         """Update, evaluate and save until all is done; the signal's number if one came before."""
@@ -133,8 +135,10 @@ class _Run:
             counter(self.last * self.learner.steps_per_update, "training (steps)", self.steps) as advance,
         ):
             logged = time.monotonic()
+            untrained = None
             if not self.points:
-                self._check(writer)
+                untrained = gathered(self.state.params)  # an update gives up what it is given
+                self._save()
             while not self.finished:
                 stopped = agreed(asked())
                 if stopped:
@@ -147,8 +151,14 @@ class _Run:
                     self._log(writer, metrics)
                 self._look_for_unstable()
                 advance(self.learner.steps_per_update)
-                if self.updates % self.between == 0 or self.updates >= self.last:
-                    self._check(writer)
+                if untrained is not None:  # after the first update, which says soonest whether a training runs at all
+                    self._check(writer, untrained, 0)
+                    untrained = None
+                due = self.updates % self.between == 0 or self.updates >= self.last
+                if due and not self.finished:
+                    self._check(writer, gathered(self.state.params), self.steps)
+                if due or self.finished:
+                    self._save()
         return 0
 
     def _log(self, writer: SummaryWriter, metrics: Any) -> None:
@@ -162,12 +172,11 @@ class _Run:
             for path in self.unstable.write(self.steps, caught) if is_first() else ():
                 print(f"  a simulation diverged: {path}", flush=True)
 
-    def _check(self, writer: SummaryWriter) -> None:
+    def _check(self, writer: SummaryWriter, params: Networks, steps: int) -> None:
         """All training demonstrations from frame 0; keeps the best policy, because curves are not monotone."""
-        params = gathered(self.state.params)
         scores = evaluate(self.roll_out(params.policy), [d.object for d in self.world.demonstrations]).rows()
         point = Point(
-            steps=self.steps,
+            steps=steps,
             seconds=time.monotonic() - self.start,
             success=scores["manip_trans_object"],
             tracking_error_cm=scores["tracking_error_cm"],
@@ -176,11 +185,11 @@ class _Run:
         best = min((_rank(p) for p in self.points), default=None)
         self.points.append(point)
         for name, score in scores.items():
-            writer.add_scalar(f"evaluation/{name}", score, self.steps)
+            writer.add_scalar(f"evaluation/{name}", score, steps)
         checkpoint = Checkpoint(
             policy=params.policy,
             value=params.value,
-            steps=self.steps,
+            steps=steps,
             success=point.success,
             experiment=self.config.name,
             observation_size=self.world.env.observation_size,
@@ -190,7 +199,6 @@ class _Run:
             if best is None or _rank(point) < best:
                 save_checkpoint(checkpoint, self.folder.path / "best.npz")
             _write_curve(self.points, self.folder.path / "curve.csv")
-        self._save()
         print(
             f"  {point.steps:>9,} steps, {point.seconds:4.0f} s: success {100 * point.success:5.1f} %, "
             f"tracking error {point.tracking_error_cm:.2f} cm",

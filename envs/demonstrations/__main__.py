@@ -19,11 +19,12 @@ from PIL import Image
 
 from envs.demonstrations.contact_sheet import contact_sheet
 from envs.demonstrations.contacts import check_contacts
-from envs.demonstrations.dataset import AS_RECORDED, PARTS, VARIED, YIELD, SetSettings, load_part, make_set, twins
+from envs.demonstrations.dataset import AS_RECORDED, PARTS, VARIED, YIELD, SetSettings, load_part, make_set
 from envs.demonstrations.perform import OUTCOMES
 from envs.demonstrations.quality import check_part
 from envs.demonstrations.recorded import RECORDED
 from envs.demonstrations.trials import NO_POSTURE, SPARE
+from envs.demonstrations.twin_hands import twins
 from envs.settings import made_of
 from mjx_hand.cli.output import print_table
 from mjx_hand.compile_cache import enable_compile_cache

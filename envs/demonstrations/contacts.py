@@ -8,9 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from envs.demonstrations.dataset import load_part, twins
+from envs.demonstrations.dataset import load_part
 from envs.demonstrations.holding import capsule_gaps, last_phalanges
 from envs.demonstrations.quality import LIFT
+from envs.demonstrations.twin_hands import twins
 from envs.reference import object_in_hand
 from envs.signed_distance import hull_planes
 from mjx_hand.errors import InputError

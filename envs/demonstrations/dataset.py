@@ -11,7 +11,7 @@ import hashlib
 import json
 import shutil
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +30,6 @@ from mjx_hand.motion.motion import load_motion_file, save_motion
 from mjx_hand.pytree import replace
 from mjx_hand.retarget.hands import KinematicHands
 from mjx_hand.rigid.build import build_rigid_hand
-from mjx_hand.rigid.own_hinges import with_hinges_of
-from mjx_hand.rigid.rigid_hand import RigidHand
 
 PARTS = ("train", "heldout")
 ALL = "all"
@@ -235,11 +233,3 @@ def _demonstration_files(folder: str | Path, part: str) -> list[Path]:
     if not paths:
         raise InputError(f"{folder}: no {part} demonstrations; delete the folder and run again to make the set anew")
     return paths
-
-
-def twins(demonstrations: Sequence[Demonstration]) -> list[RigidHand]:
-    """The twin's hand for each demonstration, from the shape that was fitted to the person, with its own hinges."""
-    model = load_hand(side=demonstrations[0].motion.side)
-    made = {d.shape.tobytes(): d.shape for d in demonstrations}
-    hands = {key: build_rigid_hand(model, shape) for key, shape in made.items()}
-    return [with_hinges_of(d, hands[d.shape.tobytes()]) for d in demonstrations]

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from envs.demonstrations.dataset import SetSettings, load_part, make_set, twins
+from envs.demonstrations.dataset import SetSettings, load_part, make_set
+from envs.demonstrations.twin_hands import twins
 from envs.tracking import TrackingEnv
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.rigid.rigid_hand import RigidHand

@@ -10,8 +10,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from envs.demonstrations import dataset
-from envs.demonstrations.dataset import PARTS, SetSettings, load_part, make_set, set_folder, told_apart_by, twins
+from envs.demonstrations.dataset import PARTS, SetSettings, load_part, make_set, set_folder, told_apart_by
 from envs.demonstrations.record import CaptureSettings
+from envs.demonstrations.twin_hands import twins
 from envs.tracking import TrackingEnv, twin_of
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand

@@ -8,10 +8,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.contacts import demonstration_gaps
-from envs.demonstrations.dataset import SetSettings, set_folder, twins
+from envs.demonstrations.dataset import SetSettings, set_folder
 from envs.demonstrations.holding import last_phalanges
 from envs.demonstrations.recorded import read_demonstration
 from envs.demonstrations.standing import find_table, world_from_recording
+from envs.demonstrations.twin_hands import twins
 from envs.demonstrations.variations import RecordingSettings, vary
 from mjx_hand.capture.datasets.dexmv_object import RecordedObject, load_object, recording_files
 from mjx_hand.errors import InputError
