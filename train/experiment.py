@@ -6,6 +6,9 @@ from pathlib import Path
 
 from envs.demonstrations.dataset import load_part, make_set
 from envs.demonstrations.twin_hands import twins
+from envs.evaluation import Evaluation, evaluate
+from envs.rolling import make_roll_out
+from envs.rollout import Rollouts
 from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import Demonstration
@@ -13,6 +16,7 @@ from mjx_hand.rigid.rigid_hand import RigidHand
 from mjx_hand.view.progress import shares
 from train.checkpoint import Checkpoint, load_checkpoint
 from train.config import Config
+from train.policy import deterministic_policy
 
 
 @dataclasses.dataclass(frozen=True)
@@ -59,3 +63,15 @@ def chosen_checkpoint(config: Config, observation_size: int) -> Checkpoint:
             "use the task options it was trained with, or train again"
         )
     return checkpoint
+
+
+def rolled_out(config: Config, world: World) -> tuple[Checkpoint, Rollouts, Evaluation]:
+    """The chosen policy, a rollout of each demonstration under it, and their scores.
+
+    Raises:
+        InputError: as `chosen_checkpoint`.
+    """
+    checkpoint = chosen_checkpoint(config, world.env.observation_size)
+    policy = deterministic_policy(config.ppo, world.env.observation_size, world.env.action_size)
+    rollouts = make_roll_out(world.env, world.hands, policy)(checkpoint.policy)
+    return checkpoint, rollouts, evaluate(rollouts, [demonstration.object for demonstration in world.demonstrations])

@@ -8,17 +8,13 @@ puts an experiment's best policy and its held-out demonstration of median tracki
 import dataclasses
 from pathlib import Path
 
-import numpy as np
-
 from envs.demonstrations.twin_hands import twins
-from envs.evaluation import evaluate
-from envs.rolling import make_roll_out
 from envs.tracking import TrackingEnv
 from mjx_hand.motion.demonstration import Demonstration, load_demonstration, save_demonstration
 from train.checkpoint import Checkpoint, save_checkpoint
 from train.config import Config, command
-from train.experiment import World, chosen_checkpoint, make_world
-from train.policy import deterministic_policy
+from train.experiment import World, make_world, rolled_out
+from train.video import median_and_worst
 
 FOLDER = Path(__file__).parent / "policies"
 
@@ -51,11 +47,8 @@ def _demonstration_path(name: str) -> Path:
 def main(config: Config) -> None:
     """Choose the demonstration and write."""
     world = make_world(config, "heldout")
-    checkpoint = chosen_checkpoint(config, world.env.observation_size)
-    policy = deterministic_policy(config.ppo, world.env.observation_size, world.env.action_size)
-    rollouts = make_roll_out(world.env, world.hands, policy)(checkpoint.policy)
-    errors = evaluate(rollouts, [d.object for d in world.demonstrations]).scores["tracking_error_cm"]
-    median = int(np.argsort(errors)[len(errors) // 2])
+    checkpoint, _, scores = rolled_out(config, world)
+    _, median = median_and_worst({config.seed: scores})["median"]
     for path in include(checkpoint, world.demonstrations[median], config.name):
         print(f"{path}: {path.stat().st_size / 1000:.0f} kB")
 

@@ -9,19 +9,15 @@ diverged in training instead: the state before the step, and each physics step o
 import dataclasses
 from pathlib import Path
 
-import numpy as np
-
-from envs.evaluation import evaluate
-from envs.rolling import make_roll_out
 from mjx_hand.errors import InputError
 from mjx_hand.view.viewer import Viewer
 from train.config import Config, command
-from train.experiment import World, chosen_checkpoint, make_world
+from train.experiment import World, make_world, rolled_out
 from train.included import included_policy, included_world
 from train.play_scene import rollout_scene
-from train.policy import deterministic_policy
 from train.unstable import load_unstable
 from train.unstable_scene import unstable_scene
+from train.video import median_and_worst
 
 
 def viewer(config: Config) -> Viewer:
@@ -51,14 +47,11 @@ def rollout_viewer(config: Config) -> Viewer:
         InputError: no such demonstration, or what `chosen_checkpoint` and `Viewer` refuse.
     """
     config, world = _world(config)
-    checkpoint = chosen_checkpoint(config, world.env.observation_size)
-    policy = deterministic_policy(config.ppo, world.env.observation_size, world.env.action_size)
-    rollouts = make_roll_out(world.env, world.hands, policy)(checkpoint.policy)
-    scores = evaluate(rollouts, [demonstration.object for demonstration in world.demonstrations])
+    _, rollouts, scores = rolled_out(config, world)
     errors = scores.scores["tracking_error_cm"]
     index = config.play.demonstration
     if index is None:
-        index = int(np.argsort(errors)[len(errors) // 2])
+        _, index = median_and_worst({config.seed: scores})["median"]
     if index >= len(errors):
         raise InputError(f"play.demonstration is {index}; there are {len(errors)}, numbered from 0")
     outcome = scores.failure[index] or "followed to the end"

@@ -106,7 +106,7 @@ class GraspType:
     lift: tuple[float, float]
     carry: tuple[float, float]
     turn: tuple[float, float]
-    grip_force: float
     object_rotation: Rows = UNTURNED
+    grip_force: float = 2.0
     support: tuple[Box, ...] = ()
     rest: float = 0.0
