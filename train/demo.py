@@ -33,8 +33,8 @@ from train.evaluation_page import TRACKING, tables, tracking_plot
 from train.evaluation_record import write_results
 from train.experiment import make_world
 from train.ppo import Point, train
-from train.seeds import POLICY, REPLAY, ZERO, Results, evaluate_seeds
-from train.video import film, median_and_worst
+from train.seeds import POLICY, REPLAY, ZERO, Results, evaluate_seeds, median_and_worst
+from train.video import film
 
 _FILM = "Left the demonstration, right the twin: the held-out rollout of median tracking error."
 _LEARNING = "Share of training demonstrations tracked from frame 0, unassisted. The level is the untrained policy."

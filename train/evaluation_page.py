@@ -15,8 +15,8 @@ from mjx_hand.view import plots
 from mjx_hand.view.report import Film, Headline, Plot, Report, Section, Table
 from train.benchmark.machine import processor, versions
 from train.config import Config
-from train.seeds import POLICY, REPLAY, ZERO, Results
-from train.video import film, median_and_worst
+from train.seeds import POLICY, REPLAY, ZERO, Results, median_and_worst
+from train.video import film
 
 TRACKING = "Distance of the object from where the demonstration has it, on held-out demonstrations."
 

@@ -14,7 +14,7 @@ from mjx_hand.motion.demonstration import Demonstration, load_demonstration, sav
 from train.checkpoint import Checkpoint, save_checkpoint
 from train.config import Config, command
 from train.experiment import World, make_world, rolled_out
-from train.video import median_and_worst
+from train.seeds import median_and_worst
 
 FOLDER = Path(__file__).parent / "policies"
 

@@ -15,9 +15,9 @@ from train.config import Config, command
 from train.experiment import World, make_world, rolled_out
 from train.included import included_policy, included_world
 from train.play_scene import rollout_scene
+from train.seeds import median_and_worst
 from train.unstable import load_unstable
 from train.unstable_scene import unstable_scene
-from train.video import median_and_worst
 
 
 def viewer(config: Config) -> Viewer:

@@ -9,6 +9,8 @@ import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from envs.evaluation import Evaluation, evaluate
 from envs.rolling import make_roll_out, zero_residual
 from envs.rollout import Rollouts
@@ -77,6 +79,18 @@ def evaluate_seeds(configs: Sequence[Config], part: str = "heldout") -> dict[int
 def evaluate_checkpoint(config: Config, part: str = "heldout") -> Results:
     """The results of one seed, as `evaluate_seeds`."""
     return evaluate_seeds([config], part)[config.seed]
+
+
+def median_and_worst(evaluations: Mapping[int, Evaluation]) -> dict[str, tuple[int, int]]:
+    """Seed and number of the "median" and the "worst" rollout of several seeds by tracking error.
+
+    A failure is worse than any success, however small its tracking error.
+    """
+    places = [(seed, k) for seed, e in evaluations.items() for k in range(len(e.demonstration))]
+    errors = np.concatenate([e.scores["tracking_error_cm"] for e in evaluations.values()])
+    failed = np.array([bool(reason) for e in evaluations.values() for reason in e.failure])
+    median = np.argsort(errors, kind="stable")[len(errors) // 2]
+    return {"median": places[median], "worst": places[np.lexsort((errors, failed))[-1]]}
 
 
 def shared_folder(configs: Sequence[Config]) -> Path:

@@ -1,11 +1,9 @@
 """Videos of rollouts: the demonstration and the twin side by side."""
 
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
-from envs.evaluation import Evaluation
 from envs.rollout import Rollouts
 from envs.scene import demonstration_model
 from mjx_hand.view.renderer import RendererUnavailable
@@ -14,18 +12,6 @@ from mjx_hand.view.video import beside, render_frames, write_video
 from train.experiment import World
 
 _RATE = 25.0  # frames a second
-
-
-def median_and_worst(evaluations: Mapping[int, Evaluation]) -> dict[str, tuple[int, int]]:
-    """Seed and number of the "median" and the "worst" rollout of several seeds by tracking error.
-
-    A failure is worse than any success, however small its tracking error.
-    """
-    places = [(seed, k) for seed, e in evaluations.items() for k in range(len(e.demonstration))]
-    errors = np.concatenate([e.scores["tracking_error_cm"] for e in evaluations.values()])
-    failed = np.array([bool(reason) for e in evaluations.values() for reason in e.failure])
-    median = np.argsort(errors, kind="stable")[len(errors) // 2]
-    return {"median": places[median], "worst": places[np.lexsort((errors, failed))[-1]]}
 
 
 def film(world: World, rollouts: Rollouts, index: int, path: Path, caption: str) -> Film:

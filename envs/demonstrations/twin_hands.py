@@ -42,11 +42,11 @@ def _arrays(hands: Sequence[RigidHand]) -> dict[str, np.ndarray]:
 
 def _hands(arrays: Mapping[str, np.ndarray], model: HandModel) -> list[RigidHand]:
     """The reverse of `_arrays`."""
-    count = len(arrays["link_mass"])
+    divided = {key.partition(".")[0] for key in arrays if "." in key}
     hands = []
-    for row in range(count):
+    for row in range(len(arrays["link_mass"])):
         fields = {name: array[row] for name, array in arrays.items() if "." not in name}
-        for name in ("mesh_vertices", "mesh_faces"):
+        for name in divided:
             links = sum(key.startswith(f"{name}.") for key in arrays)
             fields[name] = tuple(arrays[f"{name}.{k}"][row] for k in range(links))
         fields["capsule_links"] = tuple(fields["capsule_links"].tolist())

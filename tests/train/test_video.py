@@ -11,7 +11,8 @@ from envs.rollout import Rollouts
 from mjx_hand.view import video as view_video
 from mjx_hand.view.renderer import RendererUnavailable
 from train.experiment import World
-from train.video import film, median_and_worst, side_by_side
+from train.seeds import median_and_worst
+from train.video import film, side_by_side
 
 FRAMES = 9
 
