@@ -1,4 +1,4 @@
-"""`python -m train.benchmark [engines|keypoints|retarget|solver]`: what this machine does; all where none is named."""
+"""`python -m train.benchmark [NAME]`: what this machine does, by a module of `MODULES`; by all where none is named."""
 
 import sys
 from collections.abc import Sequence
@@ -8,9 +8,15 @@ import tyro
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 from mjx_hand.motion.archive import replacing
-from train.benchmark import engines, keypoints, retarget, solver
+from train.benchmark import convergence, engines, keypoints, retarget, solver
 
-MODULES = {"engines": engines, "keypoints": keypoints, "retarget": retarget, "solver": solver}
+MODULES = {
+    "convergence": convergence,
+    "engines": engines,
+    "keypoints": keypoints,
+    "retarget": retarget,
+    "solver": solver,
+}
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -1,19 +1,17 @@
 """The engines' figures as a Markdown table, a JSON file and a plot."""
 
 import dataclasses
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from envs.physics.native import cores
-from mjx_hand.motion.archive import replacing
 from mjx_hand.view import plots
 from train.benchmark.contestants import Contestant, Memory
 from train.benchmark.learning import Learning
-from train.benchmark.machine import accelerator, machine, processor, versions
+from train.benchmark.machine import machine
+from train.benchmark.report_files import write_report
 from train.benchmark.timing import Rate
 
 SCHEMA = "mjx-hand/benchmark-engines/2"
@@ -168,18 +166,9 @@ def write(results: Results, lines: Sequence[str], folder: Path, options: Mapping
     Raises:
         InputError: the folder cannot be written.
     """
-    content = {
-        "schema": SCHEMA,
-        "machine": {"processor": processor(), "cores": cores(), "accelerator": accelerator()},
-        "versions": versions(*_PACKAGES),
-        "options": options,
-        **dataclasses.asdict(results),
-    }
-    page, figures, plot = folder / "engines.md", folder / "engines.json", folder / "engines.png"
-    with replacing(page) as temporary:
-        temporary.write_text("\n".join(lines) + "\n")
-    with replacing(figures) as temporary:
-        temporary.write_text(json.dumps(content, indent=1) + "\n")
+    content = {"options": options, **dataclasses.asdict(results)}
+    page, figures = write_report(folder, "engines", lines, SCHEMA, _PACKAGES, content)
+    plot = folder / "engines.png"
     panels = {grasp: _curves(rows) for grasp, rows in _by_grasp(results.rows).items()}
     plots.save_figure(plots.throughput(panels, label="physics steps/s"), plot)
     return page, figures, plot

@@ -1,16 +1,14 @@
 """The solver's figures as Markdown tables and a JSON file."""
 
 import dataclasses
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from envs.physics.native import cores
-from mjx_hand.motion.archive import replacing
-from train.benchmark.machine import machine, processor, versions
+from train.benchmark.machine import machine
+from train.benchmark.report_files import write_report
 
 SCHEMA = "mjx-hand/benchmark-solver/1"
 _PACKAGES = ("mjx-hand", "mujoco", "numpy")
@@ -106,24 +104,16 @@ def _most(values: Sequence[float | None], unit: float, digits: int) -> str:
 def write(
     figures: Mapping[str, Mapping[str, Figures]], lines: Sequence[str], folder: Path, options: Mapping[str, Any]
 ) -> tuple[Path, Path]:
-    """Write `solver.json` and `solver.md`, and return their paths.
+    """Write `solver.md` and `solver.json`, and return their paths.
 
     Raises:
         InputError: the folder cannot be written.
     """
     content = {
-        "schema": SCHEMA,
-        "machine": {"processor": processor(), "cores": cores()},
-        "versions": versions(*_PACKAGES),
         "options": options,
         "grasps": {
             grasp: {name: dataclasses.asdict(row) for name, row in of_type.items()}
             for grasp, of_type in figures.items()
         },
     }
-    data, page = folder / "solver.json", folder / "solver.md"
-    with replacing(data) as temporary:
-        temporary.write_text(json.dumps(content, indent=1) + "\n")
-    with replacing(page) as temporary:
-        temporary.write_text("\n".join(lines) + "\n")
-    return data, page
+    return write_report(folder, "solver", lines, SCHEMA, _PACKAGES, content)

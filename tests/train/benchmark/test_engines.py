@@ -20,12 +20,6 @@ TINY = ("--grasps", "pinch", "--engines", "native", "--worlds", "1", "2", "--run
 
 
 @pytest.fixture(scope="module")
-def demonstrations(tmp_path_factory):
-    """The folder of the benchmark's set, made once for the tests below."""
-    return tmp_path_factory.mktemp("demonstrations")
-
-
-@pytest.fixture(scope="module")
 def world(demonstrations):
     return make_world(engines.config("native", "pinch", demonstrations), "train")
 

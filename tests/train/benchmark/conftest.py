@@ -1,0 +1,7 @@
+import pytest
+
+
+@pytest.fixture(scope="session")
+def demonstrations(tmp_path_factory):
+    """A folder in which the small sets that are measured on are made once."""
+    return tmp_path_factory.mktemp("demonstrations")

@@ -1,0 +1,171 @@
+"""`python -m train.benchmark convergence`: what is left to solve when the solver stops, under training's commands.
+
+The grasps of `solver` follow smooth commands. In training targets jump at each control step by random residuals, and
+the last step's solution says less about the next. Here worlds all over the demonstrations are given such targets; each
+setting then takes the same control steps from the same states, and ends somewhere off where 1000 sweeps end.
+"""
+
+import contextlib
+import dataclasses
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from envs.grasps import grasp_names, grasp_type
+from envs.physics.engine import PhysicsState
+from envs.physics.native import NativeEngine
+from envs.tracking import TrackingEnv
+from mjx_hand.errors import InputError
+from mjx_hand.hand.joints import NUM_HINGES
+from mjx_hand.view.progress import counter
+from train.benchmark.contestants import make_script
+from train.benchmark.engines import config
+from train.benchmark.machine import machine
+from train.benchmark.report_files import write_report
+from train.benchmark.solver import CHOSEN, SWEEP, Settings
+from train.experiment import make_world
+
+SCHEMA = "mjx-hand/benchmark-convergence/1"
+COMPARED = (CHOSEN, "PGS 10", "PGS 20", "PGS 30", "Newton 10, dense", "Newton 10, sparse", "Newton 100, sparse")
+_PACKAGES = ("mjx-hand", "mujoco", "jax", "numpy")
+_SOLVED = Settings({"iterations": 1000, "tolerance": 0.0})
+_SHARES = (50, 90, 99)  # percent of the control steps that end as near as a column says
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """Measure how far a control step of training ends from the solved one, and what it costs.
+
+    Attributes:
+        grasps: the types; all if none is named.
+        worlds: how many there are, all over the demonstrations.
+        runs: timed runs of each setting, of which the median is given.
+        out: folder for convergence.md and convergence.json.
+        demonstrations: folder below which demonstration sets are kept, and made where missing.
+    """
+
+    grasps: tuple[str, ...] = ()
+    worlds: int = 256
+    runs: int = 5
+    out: Path = Path("outputs/benchmark")
+    demonstrations: Path = Path("outputs/demonstrations")
+
+
+@dataclasses.dataclass(frozen=True)
+class Figures:
+    """What one setting came to on one grasp type.
+
+    Attributes:
+        steps: physics steps a second of CPU time, median of the runs.
+        object_off: how far the object ends from the solved step's end (m), at the shares of `_SHARES`.
+        hinges_off: the same of the hinge that is furthest off (rad).
+    """
+
+    steps: float
+    object_off: Sequence[float]
+    hinges_off: Sequence[float]
+
+
+def report(options: Options) -> list[str]:
+    """Measure, write the files, and return the lines of the report.
+
+    Raises:
+        InputError: for options out of range, or a folder that cannot be written.
+    """
+    if options.worlds < 1 or options.runs < 1:
+        raise InputError(f"{options.worlds} worlds, {options.runs} runs; give at least 1 of each")
+    grasps = [grasp_type(name).name for name in options.grasps or grasp_names()]
+    figures = {}
+    with (
+        contextlib.redirect_stdout(sys.stderr),  # progress; the report alone goes to standard output
+        counter(len(grasps) * (options.runs * len(COMPARED) + 1), "stepping") as advance,
+    ):
+        for grasp in grasps:
+            env = make_world(config("native", grasp, options.demonstrations), "train").env
+            state, controls = moments(env, options.worlds)
+            solved, _ = _ends(env, _SOLVED, state, controls)
+            advance(1)
+            ends, rates = {}, {name: [] for name in COMPARED}
+            for _ in range(options.runs):
+                for name in COMPARED:
+                    ends[name], rate = _ends(env, SWEEP[name], state, controls)
+                    rates[name].append(rate)
+                    advance(1)
+            figures[grasp] = {
+                name: Figures(float(np.median(rates[name])), *_off(ends[name], solved)) for name in COMPARED
+            }
+    lines = _text(figures)
+    content = {
+        "options": {"worlds": options.worlds, "runs": options.runs},
+        "shares": _SHARES,
+        "grasps": {g: {name: dataclasses.asdict(row) for name, row in rows.items()} for g, rows in figures.items()},
+    }
+    files = write_report(options.out, "convergence", lines, SCHEMA, _PACKAGES, content)
+    return [*lines, "", *(str(file) for file in files)]
+
+
+def moments(env: TrackingEnv, worlds: int) -> tuple[PhysicsState, Float[jax.Array, "n 26"]]:
+    """States that worlds pass through under jumping targets, and the targets of the control step that follows each."""
+    script = make_script(env, worlds)
+    state = jax.jit(jax.vmap(env.start))(script.variant, script.frame).pipeline_state.physics
+    step, states = jax.jit(jax.vmap(env.engine.step)), []
+    for targets in script.controls:
+        states.append(state)
+        state = step(state, jnp.asarray(targets, jnp.float32))
+    # The first control step has no solution of a step before to begin with, which training's hardly ever lack.
+    joined = jax.tree.map(lambda *rows: jnp.concatenate(rows), *states[1:])
+    return joined, jnp.asarray(np.concatenate(script.controls[1:]), jnp.float32)
+
+
+def _ends(
+    env: TrackingEnv, settings: Settings, state: PhysicsState, controls: Float[jax.Array, "n 26"]
+) -> tuple[Float[np.ndarray, "n q"], float]:
+    """Where one control step with these settings leads, and its physics steps a second of CPU time."""
+    engine = NativeEngine(settings.applied(env.engine.models), env.engine.substeps)
+    step = jax.jit(jax.vmap(engine.step))
+    jax.block_until_ready(step(state, controls))  # compiles, and loads the models
+    began = time.process_time()
+    ended = jax.block_until_ready(step(state, controls))
+    taken = time.process_time() - began
+    return np.asarray(ended.qpos), len(controls) * engine.substeps / taken
+
+
+def _off(ends: Float[np.ndarray, "n q"], solved: Float[np.ndarray, "n q"]) -> tuple[list[float], list[float]]:
+    """See `Figures`. The object's pose is the end of qpos, its position first; hinges come just before."""
+    thing = np.linalg.norm(ends[:, -7:-4] - solved[:, -7:-4], axis=-1)
+    hinges = np.abs(ends[:, -7 - NUM_HINGES : -7] - solved[:, -7 - NUM_HINGES : -7]).max(axis=-1)
+    return np.percentile(thing, _SHARES).tolist(), np.percentile(hinges, _SHARES).tolist()
+
+
+def _text(figures: Mapping[str, Mapping[str, Figures]]) -> list[str]:
+    lines = [
+        "## One control step of training",
+        "",
+        *machine(*_PACKAGES),
+        "",
+        "*Speed*: physics steps a second of CPU time, the first row's being 1. *Off*: how far the step ends from where",
+        "1000 sweeps end, at the median, for 90 and for 99 of 100 control steps.",
+    ]
+    for grasp, rows in figures.items():
+        lines += [
+            "",
+            f"### {grasp}",
+            "",
+            "| settings | speed | thousands a second | object off, µm | hinges off, ° |",
+            "|---|---:|---:|---:|---:|",
+        ]
+        for name, row in rows.items():
+            cells = (
+                f"{row.steps / rows[CHOSEN].steps:.2f}",
+                f"{row.steps / 1e3:.0f}",
+                " / ".join(f"{1e6 * off:.1f}" for off in row.object_off),
+                " / ".join(f"{np.rad2deg(off):.2f}" for off in row.hinges_off),
+            )
+            lines.append(f"| {name} | {' | '.join(cells)} |")
+    return lines
