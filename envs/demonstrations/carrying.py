@@ -19,7 +19,7 @@ from envs.scene import NUM_WRIST, TIMESTEP, scene_model, wrist_coordinates
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.motion.resample import matrix_quaternions
 from mjx_hand.rigid.gains import Gains
-from mjx_hand.rigid.rigid_hand import without_meshes
+from mjx_hand.rigid.rigid_hand import on_device
 
 _SETTLED = 10  # frames after the fingers have closed
 _LOST, _TURNED = 0.03, 0.5  # m and rad from its way: lost
@@ -61,7 +61,7 @@ class Carrying:
         (self.model,) = gauss_seidel([model])
         self.heavy = with_heavy_object(self.model)
         self.worlds = batch.Batch(self.model, nsim=count)
-        bare = jax.tree.map(jnp.asarray, without_meshes(act.hand))
+        bare = on_device(act.hand)
         planes = jnp.asarray(act.planes, jnp.float32)
 
         @jax.jit

@@ -16,7 +16,7 @@ from envs.reference import object_in_hand
 from envs.signed_distance import hull_planes
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import Demonstration
-from mjx_hand.rigid.rigid_hand import RigidHand, without_meshes
+from mjx_hand.rigid.rigid_hand import RigidHand, on_device
 
 _RISEN = 0.02  # m: the object is in the hand
 
@@ -64,7 +64,7 @@ def check_contacts(folder: str | Path, part: str) -> Contacts:
 def demonstration_gaps(demonstration: Demonstration, hand: RigidHand) -> Float[np.ndarray, "t c"]:
     """Distance (m) of each of the hand's capsules from a mesh object in each frame; negative inside."""
     d = demonstration
-    bare = jax.tree.map(jnp.asarray, without_meshes(hand))
+    bare = on_device(hand)
     rows = tuple(jnp.asarray(a, jnp.float32) for a in (d.motion.angles, *object_in_hand(d)))
     return np.asarray(_gaps(rows, bare, jnp.asarray(hull_planes(d.object.hulls), jnp.float32)))
 

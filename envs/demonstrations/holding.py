@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 from envs.signed_distance import signed_distance
 from mjx_hand.hand.joints import FINGERS, NUM_HINGES, TIP_LINKS
 from mjx_hand.rigid.capsules import capsule_points, last_capsule
-from mjx_hand.rigid.rigid_hand import RigidHand, without_meshes
+from mjx_hand.rigid.rigid_hand import RigidHand, on_device
 from mjx_hand.rotations import exp
 
 _ALONG = np.linspace(0.0, 1.0, 7)
@@ -74,7 +74,7 @@ def solve_holdings(recorded: Holding, hand: RigidHand, planes: Float[np.ndarray,
         hand: the twin's; its capsules stand for its skin.
         planes: of the object's convex pieces (`envs.signed_distance.hull_planes`).
     """
-    bare = jax.tree.map(jnp.asarray, without_meshes(hand))
+    bare = on_device(hand)
     residual = jax.jit(partial(_residual, hand=bare, recorded=_rows(recorded), planes=planes))
     slope = jax.jit(jax.jacfwd(residual))
     found = []
@@ -100,7 +100,7 @@ def unlikeliness(
     """
     turn = Rotation.from_matrix(recorded.rotation.T @ holdings.rotation).as_rotvec()
     rows = np.concatenate([holdings.angles, holdings.position - recorded.position, turn], axis=1)
-    bare = jax.tree.map(jnp.asarray, without_meshes(hand))
+    bare = on_device(hand)
     return np.asarray(_norms(jnp.asarray(rows, jnp.float32), bare, _rows(recorded), jnp.asarray(planes)), float)
 
 

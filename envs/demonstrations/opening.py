@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from envs.demonstrations.holding import Holding, capsule_gaps
-from mjx_hand.rigid.rigid_hand import RigidHand, without_meshes
+from mjx_hand.rigid.rigid_hand import RigidHand, on_device
 
 _STEPS, _STEP, _DAMPING = 20, 0.5, 0.02  # of damped least squares (m/rad)
 
@@ -16,7 +16,7 @@ _STEPS, _STEP, _DAMPING = 20, 0.5, 0.02  # of damped least squares (m/rad)
 def opened(holdings: Holding, hand: RigidHand, planes: Float[np.ndarray, "h f 4"], clearance: float) -> Holding:
     """Each of n holdings with all fingers at least `clearance` (m) off the object, as far as their limits allow."""
     rows = tuple(jnp.asarray(row, jnp.float32) for row in (holdings.angles, holdings.rotation, holdings.position))
-    bare = jax.tree.map(jnp.asarray, without_meshes(hand))
+    bare = on_device(hand)
     angles = _open_all(rows, bare, jnp.asarray(planes, jnp.float32), clearance)
     return dataclasses.replace(holdings, angles=np.asarray(angles, float))
 

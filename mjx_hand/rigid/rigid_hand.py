@@ -129,6 +129,11 @@ def without_meshes(rigid: RigidHand) -> RigidHand:
     return replace(rigid, mesh_vertices=(), mesh_faces=())
 
 
+def on_device(rigid: RigidHand) -> RigidHand:
+    """The hand as JAX's own arrays, without its meshes: compiled functions may take it or close over it."""
+    return jax.tree.map(jnp.asarray, without_meshes(rigid))
+
+
 def stack_hands(hands: Sequence[RigidHand]) -> RigidHand:
     """Hands of one structure as one `RigidHand` with a leading axis, to `vmap` over; float32, without their meshes."""
     first = hands[0]

@@ -1,7 +1,8 @@
-"""The open hand, its markers, and one batch of fits that several tests look at."""
+"""The open hand, its markers, a short marker recording, and one batch of fits that several tests look at."""
 
 import dataclasses
 
+import numpy as np
 import pytest
 
 from mjx_hand.capture.fit import FitReport, fit_many
@@ -50,3 +51,12 @@ def clean(hand: HandModel, marker_set: MarkerSet) -> list[Case]:
     ]
     fits = fit_many(recordings, hand, marker_set)
     return [Case(t, r, *f) for t, r, f in zip(truths, recordings, fits, strict=True)]
+
+
+@pytest.fixture(scope="session")
+def millimetres() -> np.ndarray:
+    """A marker recording: five frames with gaps; to three decimals, as text formats write them."""
+    positions = np.random.default_rng(0).uniform(-900, 900, (5, 3, 3)).round(3)
+    positions[1:3, 0] = np.nan
+    positions[4, 2] = np.nan
+    return positions

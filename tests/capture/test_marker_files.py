@@ -1,89 +1,18 @@
 """Marker files: the same recording in each format, and files that cannot be used."""
 
-import struct
 import warnings
 from pathlib import Path
 
-import ezc3d
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mjx_hand.capture.load_markers import load_markers
-from mjx_hand.capture.marker_files.c3d import screen_axes
 from mjx_hand.capture.marker_files.marker_format import marker_formats
-from mjx_hand.capture.recording import MarkerRecording, save_recording
+from mjx_hand.capture.recording import save_recording
 from mjx_hand.errors import InputError
-
-NAMES = ("hand_back", "Å tip", "nail.3")
-FPS = 120.0
-
-
-@pytest.fixture(scope="module")
-def millimetres() -> np.ndarray:
-    """Five frames with gaps; to three decimals, as text formats write them."""
-    positions = np.random.default_rng(0).uniform(-900, 900, (5, 3, 3)).round(3)
-    positions[1:3, 0] = np.nan
-    positions[4, 2] = np.nan
-    return positions
-
-
-def write_c3d(path: Path, positions: np.ndarray, names=NAMES, units="mm", **point) -> Path:
-    """By another project's writer; a gap is NaN there."""
-    file = ezc3d.c3d()
-    file["parameters"]["POINT"]["RATE"]["value"] = [FPS]
-    file["parameters"]["POINT"]["LABELS"]["value"] = list(names)
-    file["parameters"]["POINT"]["UNITS"]["value"] = [units]
-    for key, value in point.items():
-        file.add_parameter("POINT", key, [value])
-    data = np.ones((4, len(names), len(positions)))
-    data[:3] = positions.transpose(2, 1, 0)
-    file["data"]["points"] = data
-    file.write(str(path))
-    return path
-
-
-def write_tsv(path: Path, positions: np.ndarray, names=NAMES, gap="nan", table_head=True) -> Path:
-    rows = [f"NO_OF_FRAMES\t{len(positions)}", f"NO_OF_MARKERS\t{len(names)}", f"FREQUENCY\t{FPS:g}"]
-    rows.append("\t".join(["MARKER_NAMES", *names]))
-    if table_head:
-        rows.append("\t".join(["Frame", "Time", *(f"{n} {axis}" for n in names for axis in "XYZ")]))
-    for k, frame in enumerate(positions):
-        cells = [gap if np.isnan(v) else f"{v:.3f}" for v in frame.ravel()]
-        rows.append("\t".join([str(k + 1), f"{k / FPS:.5f}", *cells] if table_head else cells))
-    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
-    return path
-
-
-def write_trc(path: Path, positions: np.ndarray, names=NAMES, units="mm", promised=None) -> Path:
-    keys = {"DataRate": FPS, "CameraRate": FPS, "NumFrames": promised or len(positions), "NumMarkers": len(names)}
-    keys |= {"Units": units}
-    rows = ["PathFileType\t4\t(X/Y/Z)\tfile.trc", "\t".join(keys), "\t".join(map(str, keys.values()))]
-    rows.append("Frame#\tTime\t" + "\t\t\t".join(names) + "\t\t")
-    rows += ["\t\t" + "\t".join(f"{axis}{k + 1}" for k in range(len(names)) for axis in "XYZ"), ""]
-    for k, frame in enumerate(positions):
-        cells = ["" if np.isnan(v) else f"{v:.3f}" for v in frame.ravel()]
-        rows.append("\t".join([str(k + 1), f"{k / FPS:.5f}", *cells]).rstrip("\t"))
-    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
-    return path
-
-
-def write_csv(path: Path, positions: np.ndarray, names=NAMES, head="# units: mm\n# rate: 120\n") -> Path:
-    columns = [f"{n}_{axis}" for n in names for axis in "xyz"]
-    rows = [",".join("" if np.isnan(v) else f"{v:.3f}" for v in frame.ravel()) for frame in positions]
-    path.write_text(head + "\n".join([",".join(columns), *rows]) + "\n", encoding="utf-8")
-    return path
-
-
-WRITERS = {"c3d": write_c3d, "tsv": write_tsv, "trc": write_trc, "csv": write_csv}
-
-
-def check_same(recording: MarkerRecording, millimetres: np.ndarray) -> None:
-    seen = np.asarray(np.isfinite(millimetres).all(axis=2))
-    np.testing.assert_array_equal(recording.visible, seen)
-    np.testing.assert_allclose(recording.positions, np.where(seen[..., None], 0.001 * millimetres, 0.0), atol=1e-7)
-    assert recording.fps == pytest.approx(FPS)
+from tests.capture.marker_files import FPS, NAMES, WRITERS, check_same, write_c3d, write_csv, write_trc, write_tsv
 
 
 @pytest.mark.parametrize("suffix", WRITERS)
@@ -135,16 +64,6 @@ def test_zeros_are_gaps(tmp_path, millimetres):
         check_same(load_markers(write(tmp_path / f"z.{suffix}", np.nan_to_num(millimetres))), millimetres)
 
 
-def test_points_of_negative_residual_are_gaps(tmp_path, millimetres):
-    path = write_c3d(tmp_path / "r.c3d", np.where(np.isnan(millimetres), 7.0, millimetres))
-    content = bytearray(path.read_bytes())
-    start = (struct.unpack_from("<H", content, 16)[0] - 1) * 512
-    for frame, marker in np.argwhere(np.isnan(millimetres).any(axis=2)):
-        struct.pack_into("<f", content, start + 16 * (frame * len(NAMES) + marker) + 12, -1.0)
-    path.write_bytes(content)
-    check_same(load_markers(path), millimetres)
-
-
 def test_qualisys_variants(tmp_path, millimetres):
     check_same(load_markers(write_tsv(tmp_path / "a.tsv", millimetres, gap="")), millimetres)
     check_same(load_markers(write_tsv(tmp_path / "b.tsv", millimetres, table_head=False)), millimetres)
@@ -164,97 +83,6 @@ def test_csv_rate_from_its_times(tmp_path, millimetres):
     path.write_text("\n".join(["# units: mm", head, rows[0], *rows[2:]]))
     with pytest.raises(InputError, match="'Time' are not evenly spaced"):
         load_markers(path)
-
-
-@given(st.permutations([0, 1, 2]), st.lists(st.sampled_from("+-"), min_size=2, max_size=2))
-def test_screen_axes_turn_what_was_up_to_z(order, signs):
-    right, up = (s + "XYZ"[k] for s, k in zip(signs, order, strict=False))
-    turn = screen_axes(Path("f"), right, up)
-    assert np.linalg.det(turn) == pytest.approx(1.0)
-    for name, expected in ((right, [1, 0, 0]), (up, [0, 0, 1])):
-        vector = (1 if name[0] == "+" else -1) * np.eye(3)["XYZ".index(name[1])]
-        np.testing.assert_array_equal(turn @ vector, expected)
-
-
-def test_c3d_with_y_up_is_turned(tmp_path, millimetres):
-    path = write_c3d(tmp_path / "r.c3d", millimetres, X_SCREEN="+X", Y_SCREEN="+Y")
-    found = load_markers(path).positions[0] * 1000
-    np.testing.assert_allclose(found, millimetres[0][:, [0, 2, 1]] * [1, -1, 1], atol=1e-3)
-    np.testing.assert_array_equal(screen_axes(path, "", ""), np.eye(3))
-    with pytest.raises(InputError, match=r"X_SCREEN is \+X and Y_SCREEN -X"):
-        screen_axes(path, "+X", "-X")
-
-
-def test_c3d_that_is_cut_off_or_of_another_byte_order(tmp_path, millimetres):
-    whole = write_c3d(tmp_path / "r.c3d", np.tile(millimetres, (400, 1, 1))).read_bytes()
-    broken = tmp_path / "broken.c3d"
-
-    processor = bytearray(whole)
-    processor[512 + 3] = 86
-    for content, message in (
-        (whole[:-4000], "bytes are there; the file is truncated"),
-        (whole[:700], "cut off in its header"),
-        (b"hello" * 500, "not a C3D file"),
-        (bytes(processor), "header says big-endian, but its numbers are little-endian"),
-        (b"", "the file is empty"),
-    ):
-        broken.write_bytes(content)
-        with pytest.raises(InputError, match=message):
-            load_markers(broken)
-
-
-def c3d_by_hand(order: str, scale: float, frames: np.ndarray, processor: int, float_bytes) -> bytes:
-    """A C3D file from its manual: one point "p" at 100/s in millimetres, coordinates and residual a frame."""
-
-    def parameter(name: str, kind: int, dimensions: list[int], data: bytes) -> bytes:
-        body = struct.pack("bB", kind, len(dimensions)) + bytes(dimensions) + data + b"\0"
-        return struct.pack("bb", len(name), 1) + name.encode() + struct.pack(order + "h", len(body) + 2) + body
-
-    group = struct.pack("bb", 5, -1) + b"POINT" + struct.pack(order + "h", 3) + b"\0"
-    body = parameter("LABELS", -1, [4, 1], b"p   ") + parameter("UNITS", -1, [2], b"mm")
-    body += parameter("RATE", 4, [], float_bytes(100.0))
-    section = bytes([1, 80, 1, processor]) + group + body
-    head = struct.pack(order + "HHHHH", 1, 0, 1, len(frames), 10) + float_bytes(scale) + struct.pack(order + "HH", 3, 0)
-    data = frames.astype(order + "i2").tobytes() if scale > 0 else b"".join(map(float_bytes, frames.ravel()))
-    return (bytes([2, 0x50]) + head).ljust(512, b"\0") + section.ljust(512, b"\0") + data
-
-
-def vax(value: float) -> bytes:
-    """VAX F floating point: four times the number in IEEE 754, its two words the other way round."""
-    content = struct.pack("<f", 4 * value)
-    return content[2:] + content[:2]
-
-
-@pytest.mark.parametrize(
-    ("order", "processor", "float_bytes"),
-    [
-        ("<", 84, lambda v: struct.pack("<f", v)),
-        (">", 86, lambda v: struct.pack(">f", v)),
-        ("<", 85, vax),
-    ],
-)
-@pytest.mark.parametrize("scale", [0.5, -1.0])
-def test_c3d_of_every_processor_as_integers_and_floating_point(tmp_path, order, processor, float_bytes, scale):
-    frames = np.array([[100, -200, 300, 0], [1, 2, 3, -1], [0, 0, 0, 0], [4, 5, -6, 5]])
-    path = tmp_path / "r.c3d"
-    path.write_bytes(c3d_by_hand(order, scale, frames, processor, float_bytes))
-    recording = load_markers(path)
-    assert (recording.names, recording.fps) == (("p",), 100.0)
-    np.testing.assert_array_equal(recording.visible[:, 0], [True, False, False, True])
-    expected = frames[[0, 3], :3] * (0.5 if scale > 0 else 1.0) / 1000
-    np.testing.assert_allclose(recording.positions[[0, 3], 0], expected, rtol=1e-6)
-    content = bytearray(path.read_bytes())
-    content[512 + 3] = {84: 86, 85: 86, 86: 84}[processor]
-    path.write_bytes(content)
-    with pytest.raises(InputError, match=r"but its numbers are (little|big)-endian|header makes no sense"):
-        load_markers(path)
-
-
-def test_c3d_of_more_frames_than_its_header_can_count(tmp_path):
-    positions = np.tile(np.arange(1.0, 70001.0)[:, None, None], (1, 1, 3))
-    recording = load_markers(write_c3d(tmp_path / "long.c3d", positions, ("p",)))
-    assert recording.num_frames == 70000
-    np.testing.assert_allclose(recording.positions[:, 0, 0], positions[:, 0, 0] / 1000)
 
 
 @settings(max_examples=60, deadline=None)

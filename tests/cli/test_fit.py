@@ -15,7 +15,7 @@ from mjx_hand.hand.load import load_hand
 from mjx_hand.motion import load_motion_file
 from mjx_hand.pytree import replace
 from tests.capture.grasps import errors, grasp
-from tests.capture.test_marker_files import write_c3d
+from tests.capture.marker_files import write_c3d
 
 
 @pytest.fixture(scope="module")

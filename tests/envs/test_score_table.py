@@ -13,7 +13,7 @@ from envs.score_table import (
 )
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import ObjectDescription
-from tests.envs.test_metrics import CUBE, lift
+from tests.envs.lifts import CUBE, lift
 
 
 def evaluation(success: list[bool], **scores: list[float]) -> Evaluation:

@@ -1,33 +1,22 @@
-"""Following keypoints: derivatives, recovery of known motions, limits, gaps, and another program's objective."""
-
-from functools import partial
+"""Following keypoints: recovery of known motions, limits, gaps, and another program's objective."""
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from mjx_hand.errors import InputError
 from mjx_hand.pytree import replace
-from mjx_hand.retarget.alignment import aligned
 from mjx_hand.retarget.keypoint_stream import KeypointStream
 from mjx_hand.retarget.keypoints import retarget_keypoints
-from mjx_hand.retarget.kinematic_tree import BASE, KinematicTree, joint_values, tree_points
-from mjx_hand.retarget.normal_equations import FREE, Posture, linearise
+from mjx_hand.retarget.kinematic_tree import KinematicTree, joint_values, tree_points
+from mjx_hand.retarget.normal_equations import Posture, linearise
 from mjx_hand.retarget.objectives import (
     Objective,
-    Targets,
-    brought_together,
-    dexpilot_pairs,
     human_vectors,
-    num_thumb_pairs,
     targets_of,
 )
-from mjx_hand.retarget.palm_frame import in_palm
 from mjx_hand.retarget.robot_hand import RobotHand, load_robot, robot_objective
-from mjx_hand.retarget.sparse_solve import solve_definite
-from mjx_hand.rotations import axis_angle_matrix
 from tests.retarget.robots import urdf_of
 
 FRAMES = 200
@@ -38,11 +27,6 @@ def inspire() -> tuple[RobotHand, KinematicTree, Objective]:
     """Six degrees of freedom that drive twelve joints."""
     robot = load_robot("inspire")
     return robot, *robot_objective(robot, urdf_of("inspire"))
-
-
-@pytest.fixture(scope="module")
-def video(recordings) -> np.ndarray:
-    return np.load(recordings / "mediapipe_video/joints.npz")["joints"]
 
 
 def smooth_dofs(tree: KinematicTree, frames: int = FRAMES, seed: int = 0) -> np.ndarray:
@@ -61,93 +45,6 @@ def keypoints_of(dofs: np.ndarray, tree: KinematicTree, objective: Objective) ->
     for origin, task, k in zip(objective.origins, objective.tasks, objective.human_tasks, strict=True):
         keypoints[:, k] = points[:, task] - points[:, origin]
     return keypoints
-
-
-def small_tree() -> KinematicTree:
-    """A base with two fingers: turning, sliding and tied joints."""
-    rng = np.random.default_rng(4)
-    turns = Rotation.random(6, rng=rng).as_matrix()
-    return KinematicTree(
-        rest_rotation=turns.astype(np.float32),
-        rest_position=rng.uniform(-0.04, 0.04, (6, 3)).astype(np.float32),
-        slope=np.array([1, 1, -0.7, 1, 1, 1.3], np.float32),
-        shift=np.array([0, 0, 0.2, 0, 0, -0.1], np.float32),
-        lower=np.full(4, -2, np.float32),
-        upper=np.full(4, 2, np.float32),
-        point_position=rng.uniform(-0.05, 0.05, (4, 3)).astype(np.float32),
-        parents=(BASE, 0, 1, BASE, 3, 4),
-        dofs=(0, 1, 1, 2, 3, 3),  # two joints of a finger share one; the last, too
-        slides=(False, False, False, False, True, False),
-        point_joints=(BASE, 2, 5, 4),
-        dof_names=("a", "b", "c", "d"),
-        joint_names=tuple("uvwxyz"),
-        point_names=tuple("pqrs"),
-    )
-
-
-@pytest.mark.parametrize("kind", ["vector", "position"])
-@pytest.mark.parametrize("free_base", [True, False])
-def test_gradient_and_hessian_are_those_of_automatic_differentiation(kind, free_base):
-    """Huber's straight part, both sides of it, tied and sliding joints, vectors between moving points."""
-    tree = small_tree()
-    objective = Objective(
-        kind=kind,
-        origins=(BASE, 0, 3, 1),
-        tasks=(1, 2, 2, 3),
-        human_origins=(0,) * 4,
-        human_tasks=(1, 2, 3, 4),
-        free_base=free_base,
-    )
-    rng = np.random.default_rng(5)
-    targets = Targets(
-        vectors=jnp.asarray(rng.uniform(-0.06, 0.06, (4, 3, 1)), jnp.float32),
-        weights=jnp.asarray([[1.0], [0.5], [2.0], [0.0]]),
-    )
-    turn = Rotation.random(rng=rng).as_matrix().astype(np.float32)
-
-    def posture_at(unknowns):
-        step = unknowns[:FREE] if free_base else jnp.zeros(FREE)
-        # Turns about the three axes one after the other, whose second derivatives the solver takes.
-        spin = jnp.eye(3)
-        for k in range(3):
-            spin = spin @ axis_angle_matrix(jnp.eye(3)[k], step[k])
-        rotation = (spin @ turn if free_base else jnp.eye(3))[..., None]
-        return Posture(values=unknowns[-4:, None], rotation=rotation, position=step[3:, None])
-
-    def value(unknowns):
-        """The objective from its definition."""
-        posture = posture_at(unknowns)
-        points = posture.rotation[..., 0] @ tree_points(posture.values[:, 0], tree).T + posture.position
-        begin = jnp.stack([points[:, k] if k >= 0 else jnp.zeros(3) for k in objective.origins])
-        error = points[:, jnp.array(objective.tasks)].T - begin - targets.vectors[..., 0]
-        size = jnp.abs(error) if kind == "position" else jnp.linalg.norm(error, axis=1, keepdims=True)
-        huber = jnp.where(size < 0.02, size**2 / 0.04, size - 0.01)
-        return jnp.sum(targets.weights * huber)
-
-    start = jnp.concatenate([jnp.zeros(FREE * free_base), jnp.asarray(rng.uniform(-1, 1, 4), jnp.float32)])
-    found = jax.jit(lambda unknowns: linearise(posture_at(unknowns), targets, tree, objective))(start)
-    gradient = jax.jit(jax.jacfwd(value))(start)
-    hessian = np.asarray(jax.jit(jax.jacfwd(jax.jacfwd(value)))(start))
-    np.testing.assert_allclose(found.value[0], jax.jit(value)(start), rtol=1e-5)
-    np.testing.assert_allclose(np.array([g[0] for g in found.gradient]), gradient, rtol=1e-4, atol=1e-4)
-    mine = np.zeros_like(hessian)
-    for (row, column), entry in found.hessian.items():
-        mine[row, column] = mine[column, row] = entry[0]
-    np.testing.assert_allclose(mine, hessian, rtol=1e-3, atol=2e-3 * np.abs(hessian).max())
-
-
-def test_sparse_systems_are_solved():
-    rng = np.random.default_rng(6)
-    tree_like = [(3, 0), (3, 2), (4, 1), (2, 0)]  # and entries that fill in
-    entries = {(k, k): jnp.asarray([5.0 + k]) for k in range(5)} | {
-        p: jnp.asarray(rng.normal(size=1)) for p in tree_like
-    }
-    dense = np.zeros((5, 5))
-    for (i, j), value in entries.items():
-        dense[i, j] = dense[j, i] = float(value[0])
-    right = rng.normal(size=5)
-    found = solve_definite(entries, [jnp.asarray([r]) for r in right], [1e-6] * 5)
-    np.testing.assert_allclose(np.array(found)[:, 0], np.linalg.solve(dense, right), rtol=1e-5)
 
 
 def test_known_postures_come_back_and_limits_hold(inspire):
@@ -284,63 +181,3 @@ def test_bad_keypoints_are_refused_in_one_line(inspire):
         KeypointStream(tree, objective, low_pass=0.0)
     with pytest.raises(InputError, match="one frame of 21 x 3"):
         KeypointStream(tree, objective).step(np.zeros((2, 21, 3), np.float32))
-
-
-def test_tips_are_together_from_pinch_to_release():
-    origins, tasks = dexpilot_pairs(3)
-    human = tuple(4 * k for k in range(4))
-    objective = Objective(
-        kind="dexpilot",
-        origins=origins,
-        tasks=tasks,
-        human_origins=tuple(human[k] for k in origins),
-        human_tasks=tuple(human[k] for k in tasks),
-    )
-    assert num_thumb_pairs(objective) == 2
-    apart = np.array([0.10, 0.04, 0.02, 0.04, 0.06, 0.04, 0.02, np.nan, 0.04])
-    keypoints = np.zeros((len(apart), 21, 3), np.float32)
-    keypoints[:, 8, 0] = apart  # the index tip, from the thumb's at the origin
-    keypoints[:, 12, 1] = 0.02  # the middle finger's stays near
-    vectors = human_vectors(jnp.asarray(keypoints), objective)
-    linked = jnp.asarray([False, *[True] * 8])
-    together = np.asarray(brought_together(vectors, objective, linked, jnp.zeros(2, bool)))
-    expected = [False, False, True, True, False, False, True, True, True]
-    np.testing.assert_array_equal(together[0], expected)
-    assert together[1].all()
-    again = brought_together(vectors, objective, linked.at[5].set(False), jnp.zeros(2, bool))
-    np.testing.assert_array_equal(np.asarray(again)[0], expected)
-    targets = targets_of(vectors, objective, jnp.asarray(together))
-    np.testing.assert_allclose(targets.weights[0, :3] * 6, [1, 1, 200])  # thumb and index
-    np.testing.assert_allclose(np.linalg.norm(targets.vectors[0, :, 2]), 1e-4, rtol=1e-2)
-    np.testing.assert_allclose(targets.weights[2, 2] * 6, 400)  # index and middle: both touch the thumb, and are near
-    assert targets.weights[0, 7] == 0
-
-
-def test_palms_are_brought_to_the_robots_axes_from_any_frame(video):
-    fingers, palmar = np.array([0.0, 0, 1]), np.array([1.0, 0, 0])
-    seen = in_palm(video, "right", fingers, palmar)
-    turn, shift = Rotation.from_rotvec([0.3, -1.2, 2.0]).as_matrix(), np.array([0.1, 2.0, -0.4])
-    np.testing.assert_allclose(in_palm(video @ turn.T + shift, "right", fingers, palmar), seen, atol=1e-6)
-    middle = seen[:, 9] / np.linalg.norm(seen[:, 9], axis=-1, keepdims=True)
-    np.testing.assert_allclose(middle, np.tile(fingers, (len(seen), 1)), atol=1e-6)
-    assert (seen[:, 5, 1] > seen[:, 13, 1]).all()  # a right hand's index finger lies on the side of fingers × palmar
-    mirrored = in_palm(video * [1, -1, 1], "left", fingers, palmar)
-    np.testing.assert_allclose(mirrored, seen * [1, -1, 1], atol=1e-6)
-    with pytest.raises(InputError, match="give 'right' or 'left'"):
-        in_palm(video, "both", fingers, palmar)
-
-
-def test_alignment_finds_where_the_base_stands():
-    tree = small_tree()
-    objective = Objective(
-        kind="position", origins=(BASE,) * 4, tasks=(0, 1, 2, 3), human_origins=(BASE,) * 4, human_tasks=(0, 5, 9, 17)
-    )
-    objective = replace(objective, free_base=True)
-    rng = np.random.default_rng(8)
-    values = rng.uniform(-1, 1, (50, 4)).astype(np.float32)
-    turn, shift = Rotation.random(50, rng=rng).as_matrix(), rng.normal(0, 0.5, (50, 3))
-    points = np.einsum("tij,tkj->tki", turn, tree_points(values, tree)) + shift[:, None]
-    targets = Targets(vectors=jnp.asarray(np.moveaxis(points, 0, -1), jnp.float32), weights=jnp.full((4, 50), 0.25))
-    found = jax.jit(partial(aligned))(jnp.asarray(values.T), targets, tree, objective)
-    np.testing.assert_allclose(np.moveaxis(found.rotation, -1, 0), turn, atol=1e-3)
-    np.testing.assert_allclose(np.asarray(found.position).T, shift, atol=1e-4)
