@@ -15,13 +15,12 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 from train.ablations_page import Ablation, write_ablations_page
 from train.ablations_variants import UNCHANGED, VARIANTS, Variant
 from train.config import Config, compose_seeds
-from train.results import SEEDS, listed, measure, taken
 from train.results_table import Experiment
+from train.several import SEEDS, listed, measure, run_command, taken
 
 NAMES = ("spherical",)
 FOLDER = "outputs/ablations"
@@ -42,24 +41,14 @@ class Plan:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Train, evaluate and write; returns the exit status: 0, or 2 for input that cannot be used.
+    """Train, evaluate and write; see `run_command`."""
+    return run_command("ablations", str(__doc__), argv, _ablations)
 
-    Args:
-        argv: the arguments; the process's own if None.
-    """
-    argv = sys.argv[1:] if argv is None else argv
-    if {"-h", "--help"} & set(argv):
-        print(__doc__)
-        return 0
-    try:
-        enable_compile_cache()
-        plans, folder = plan(argv)
-        run(plans, folder, shlex.join(["python", "-m", "train.ablations", *argv]))
-        print(f"\nablations: {(folder / 'index.html').resolve()}  (open it in a browser), ablations.md, ablations.json")
-    except InputError as error:
-        print(f"ablations: {error}", file=sys.stderr)
-        return 2
-    return 0
+
+def _ablations(argv: Sequence[str]) -> Path:
+    plans, folder = plan(argv)
+    run(plans, folder, shlex.join(["python", "-m", "train.ablations", *argv]))
+    return folder / "index.html"
 
 
 def plan(argv: Sequence[str]) -> tuple[list[Plan], Path]:

@@ -11,7 +11,7 @@ import pytest
 
 from mjx_hand.errors import InputError
 from tests.train.test_results import curve, row, summary
-from train import ablations, results, video
+from train import ablations, several, video
 from train.ablations import Plan, plan, run
 from train.ablations_page import Ablation, ablation_table, write_ablations_page
 from train.ablations_variants import UNCHANGED, VARIANTS
@@ -135,10 +135,10 @@ def work(monkeypatch, tmp_path) -> list[str]:
         content = summary("spherical", [1.0] * len(configs)) | {"made_of": made_of(configs)}
         (Path(configs[0].out).parent / "evaluation.json").write_text(json.dumps(content))
 
-    monkeypatch.setattr(results, "make_world", lambda config, part: None)
-    monkeypatch.setattr(results, "train", train)
-    monkeypatch.setattr(results, "evaluate_and_write", evaluate)
-    monkeypatch.setattr(ablations, "enable_compile_cache", lambda: None)
+    monkeypatch.setattr(several, "make_world", lambda config, part: None)
+    monkeypatch.setattr(several, "train", train)
+    monkeypatch.setattr(several, "evaluate_and_write", evaluate)
+    monkeypatch.setattr(several, "enable_compile_cache", lambda: None)
     return done
 
 
@@ -160,8 +160,8 @@ def test_variants_that_are_done_are_shown_while_others_wait(work: list[str], mon
             raise InputError("the disk is full")
         first(config, world)
 
-    first = results.train
-    monkeypatch.setattr(results, "train", train)
+    first = several.train
+    monkeypatch.setattr(several, "train", train)
     assert ablations.main(["variants=[residual off,no grip]", "seeds=[0,1]", "ppo.num_timesteps=1000"]) == 2
     assert capsys.readouterr().err == "ablations: the disk is full\n"
     assert "Not done yet: spherical (no grip)." in Path("outputs/ablations/ablations.md").read_text()
@@ -170,7 +170,7 @@ def test_variants_that_are_done_are_shown_while_others_wait(work: list[str], mon
 def test_a_tiny_training_and_its_baselines(
     trained: tuple[Path, list[Point]], tiny: Config, world: World, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(results, "make_world", lambda config, part: world)
+    monkeypatch.setattr(several, "make_world", lambda config, part: world)
     monkeypatch.setattr(video, "side_by_side", lambda world, rollouts, index, path: Path(path).write_bytes(b"film"))
     out = tmp_path / "tiny" / "as_configured" / "seed0"
     shutil.copytree(trained[0], out)

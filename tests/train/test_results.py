@@ -10,7 +10,7 @@ import pytest
 from envs.failure import FAILURES
 from envs.published import PAPER
 from mjx_hand.errors import InputError
-from train import results
+from train import results, several
 from train.config import Config
 from train.curve import is_finished, load_curve, minutes_to_learn
 from train.evaluation_record import made_of
@@ -204,10 +204,10 @@ def work(monkeypatch, tmp_path) -> list[str]:
         content = summary(configs[0].data.grasp, [1.0] * len(configs)) | {"made_of": made_of(configs)}
         (Path(configs[0].out).parent / "evaluation.json").write_text(json.dumps(content))
 
-    monkeypatch.setattr(results, "make_world", lambda config, part: None)
-    monkeypatch.setattr(results, "train", train)
-    monkeypatch.setattr(results, "evaluate_and_write", evaluate)
-    monkeypatch.setattr(results, "enable_compile_cache", lambda: None)
+    monkeypatch.setattr(several, "make_world", lambda config, part: None)
+    monkeypatch.setattr(several, "train", train)
+    monkeypatch.setattr(several, "evaluate_and_write", evaluate)
+    monkeypatch.setattr(several, "enable_compile_cache", lambda: None)
     return done
 
 
@@ -233,11 +233,20 @@ def test_one_experiment_that_is_done_is_shown_while_others_wait(work: list[str],
             raise InputError("the disk is full")
         first(config, world)
 
-    first = results.train
-    monkeypatch.setattr(results, "train", train)
+    first = several.train
+    monkeypatch.setattr(several, "train", train)
     assert results.main(["names=[pinch,lateral]", "seeds=[0,1]", "ppo.num_timesteps=1000"]) == 2
     assert work == ["train pinch 0", "train pinch 1", "evaluate pinch"]
     assert "Not done yet: lateral." in Path("outputs/results/results.md").read_text()
+
+
+def test_ctrl_c_ends_in_one_line(work: list[str], monkeypatch, capsys):
+    def stop(config: Config, part: str) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(several, "make_world", stop)
+    assert results.main(["names=[pinch]", "seeds=[0,1]", "ppo.num_timesteps=1000"]) == 130
+    assert capsys.readouterr().err == "\nresults: stopped; the same command goes on from here\n"
 
 
 def test_help_says_what_it_takes(capsys):
