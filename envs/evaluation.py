@@ -20,7 +20,8 @@ class Evaluation:
     Attributes:
         demonstration: which demonstration each rollout followed.
         scores: metric name to its value for each rollout: success as bool, `add_auc` 0 to 1, errors in the unit that
-            ends their name. `hold` is there only where the rollouts went on after the demonstration.
+            ends their name. `hold` is there only where the rollouts went on after the demonstration, and where any
+            demonstration ends with its object raised.
         failure: why each rollout failed `manip_trans_object` (a word of `failure.FAILURES`), "" where it did not.
     """
 
@@ -48,7 +49,7 @@ def evaluate(rollouts: Rollouts, objects: Sequence[ObjectDescription]) -> Evalua
     """Score rollouts by every metric.
 
     Args:
-        rollouts: n rollouts; `hold` is scored where any has `held` frames.
+        rollouts: n rollouts; `hold` is scored where any has `held` frames and any object is to end raised.
         objects: each demonstration's object, by the numbers in `rollouts.demonstration`.
 
     Raises:
@@ -64,7 +65,7 @@ def evaluate(rollouts: Rollouts, objects: Sequence[ObjectDescription]) -> Evalua
         "chord": metrics.chord(rollouts),
         "add_auc": metrics.add_auc(rollouts, objects),
     }
-    if rollouts.held.any():
+    if rollouts.held.any() and metrics.ends_raised(rollouts).any():
         scores["hold"] = metrics.hold(rollouts)
     scores |= {
         "tracking_error_cm": metrics.tracking_error(rollouts),

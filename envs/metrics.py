@@ -133,7 +133,13 @@ def hold(rollouts: Rollouts) -> Bool[np.ndarray, "n"]:
     last = rollouts.held.shape[1] - 1 - np.argmax(judged[:, ::-1], axis=1)
     demonstrated = rises(rollouts, rollouts.object_reference)[rows, end]
     raised = rises(rollouts, rollouts.object_pose)[rows, last] >= demonstrated / 2
-    return kept & (raised | (demonstrated < RAISED))
+    return kept & (raised | ~ends_raised(rollouts))
+
+
+def ends_raised(rollouts: Rollouts) -> Bool[np.ndarray, "n"]:
+    """Whether the demonstration ends with the object 2 cm above its start, so that there is something to hold."""
+    rise = rises(rollouts, rollouts.object_reference)
+    return rise[np.arange(len(rise)), last_counted(rollouts)] >= RAISED
 
 
 def last_counted(rollouts: Rollouts) -> np.ndarray:

@@ -90,12 +90,14 @@ def ablation_table(ablation: Ablation) -> Table:
     for variant, experiment in ablation.measured:
         scores = scores_of(variant, experiment)
         zero = score_text(_SUCCESS, experiment.summary["scores"][ZERO][_SUCCESS]) if variant.learns else ""
-        rows.append((variant.name, *(_spread(name, [s[name] for s in scores]) for name in _SHOWN), zero))
+        rows.append((variant.name, *(_spread(name, [s[name] for s in scores if name in s]) for name in _SHOWN), zero))
     return Table(("", *_SHOWN.values(), "zero residual"), rows, _NOTE)
 
 
 def _spread(name: str, values: Sequence[float]) -> str:
-    """The mean with its unit, and the range of several values."""
+    """The mean with its unit, and the range of several values; "" of none."""
+    if not values:
+        return ""
     mean, least, greatest = (score_text(name, float(f(values))) for f in (np.mean, np.min, np.max))
     if least == greatest:
         return mean

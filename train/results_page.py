@@ -59,7 +59,7 @@ def _page(experiments: Sequence[Experiment], waiting: Sequence[str], command: st
         headlines=(
             Headline("success", last["success"], _beside(last["paper's success"])),
             Headline("tracking error", last["tracking error"], _beside(last["paper's tracking error"])),
-            Headline("held 5 s longer", last["held 5 s"]),
+            *([Headline("held 5 s longer", last["held 5 s"])] if last["held 5 s"] else []),
             Headline("without learning", last["zero residual"], f"demonstration alone {last['demonstration alone']}"),
         ),
         sections=(

@@ -83,7 +83,8 @@ def minutes_of(curves: Mapping[int, Sequence[Point]]) -> tuple[list[float], list
 
 def _row(title: str, experiments: Sequence[Experiment], paper: Published | None) -> tuple[str, ...]:
     def mean(column: str, name: str) -> str:
-        return score_text(name, float(np.mean([e.summary["scores"][column][name] for e in experiments])))
+        values = [scores[name] for e in experiments if name in (scores := e.summary["scores"][column])]
+        return score_text(name, float(np.mean(values))) if len(values) == len(experiments) else ""
 
     return (
         title,

@@ -79,6 +79,15 @@ def test_held_frames_count_for_hold_alone():
     assert found == kept
 
 
+def test_what_is_put_down_is_not_to_be_held():
+    rollouts = lift(held=250)
+    flat = rollouts.object_reference.copy()
+    flat[..., 2] = np.where(np.arange(290) < 30, flat[..., 2], 0.0)
+    put_down = dataclasses.replace(rollouts, object_pose=flat, object_reference=flat)
+    assert "hold" not in evaluate(put_down, [CUBE]).rows()
+    assert evaluate(rollouts, [CUBE]).rows()["hold"] == 1.0
+
+
 def test_rows_are_means_over_all_rollouts():
     rollouts = moved(lift(rows=4), by=np.array([0.0, 0.02, 0.04, 0.2])[:, None])
     found = evaluate(rollouts, [CUBE])

@@ -90,6 +90,14 @@ def test_an_experiment_that_the_paper_has_not():
     assert row(table, "mustard")["paper's success"] == ""
 
 
+def test_what_is_put_down_has_no_hold():
+    down = experiment("mustard", [0.9])
+    for scores in down.summary["scores"].values():
+        del scores["hold"]
+    table = results_table([down, experiment("pinch", [1.0])])
+    assert [row(table, name)["held 5 s"] for name in ("mustard", "pinch", "mean")] == ["", "90.0 %", ""]
+
+
 def test_seeds_that_never_learned_are_told_apart():
     slow = experiment("pinch", [1.0, 0.5], curves={0: curve(0.1, 0.5, 0.95), 1: curve(0.1, 0.2)})
     assert row(results_table([slow]), "pinch")["minutes to 95 %"] == "2.0 (1 of 2)"
