@@ -59,7 +59,8 @@ _SOLVER, _DENSE, _SPARSE = mujoco.mjtSolver, mujoco.mjtJacobian.mjJAC_DENSE, muj
 _PYRAMIDS = mujoco.mjtCone.mjCONE_PYRAMIDAL
 
 
-def _newton(iterations: int, jacobian: Any = _SPARSE, **options: Any) -> Settings:
+def newton(iterations: int, jacobian: Any = _SPARSE, **options: Any) -> Settings:
+    """Newton's method in place of the engine's own, sparse unless another Jacobian is given."""
     return Settings({"solver": _SOLVER.mjSOL_NEWTON, "iterations": iterations, "jacobian": jacobian, **options})
 
 
@@ -74,14 +75,14 @@ SWEEP = {
     "PGS 20": Settings({"iterations": 20}),
     "PGS 30": Settings({"iterations": 30}),
     "PGS 15, sparse": Settings({"jacobian": _SPARSE}),
-    "Newton 10, dense": _newton(10, _DENSE),
-    "Newton 10, sparse": _newton(10),
-    "Newton 100, dense": _newton(100, _DENSE),
-    "Newton 100, sparse": _newton(100),
+    "Newton 10, dense": newton(10, _DENSE),
+    "Newton 10, sparse": newton(10),
+    "Newton 100, dense": newton(100, _DENSE),
+    "Newton 100, sparse": newton(100),
     "CG 20, sparse": _conjugate(20),
     "CG 50, sparse": _conjugate(50),
     "PGS 15, pyramidal": Settings({"cone": _PYRAMIDS}),
-    "Newton 10, sparse, pyramidal": _newton(10, cone=_PYRAMIDS),
+    "Newton 10, sparse, pyramidal": newton(10, cone=_PYRAMIDS),
     "impratio 1": Settings({"impratio": 1.0}),
     "impratio 3": Settings({"impratio": 3.0}),
     "impratio 10": Settings({"impratio": 10.0}),
@@ -92,7 +93,7 @@ SWEEP = {
     "2 ms, solref 5 ms": Settings({"timestep": 0.002}, solref=0.005),
 }
 # What the paths are measured against: the same contacts, solved to the end at a quarter of the step.
-_REFERENCE = _newton(100, timestep=0.001, tolerance=1e-10, ls_iterations=50)
+_REFERENCE = newton(100, timestep=0.001, tolerance=1e-10, ls_iterations=50)
 
 
 @dataclasses.dataclass(frozen=True)
