@@ -1,3 +1,5 @@
+"""Where the benchmarks' sets are kept while tests run."""
+
 import pytest
 
 
