@@ -65,7 +65,7 @@ def evaluate(rollouts: Rollouts, objects: Sequence[ObjectDescription]) -> Evalua
         "chord": metrics.chord(rollouts),
         "add_auc": metrics.add_auc(rollouts, objects),
     }
-    if rollouts.held.any() and metrics.ends_raised(rollouts).any():
+    if rollouts.held.any() and (metrics.final_rise(rollouts) >= metrics.RAISED).any():
         scores["hold"] = metrics.hold(rollouts)
     scores |= {
         "tracking_error_cm": metrics.tracking_error(rollouts),

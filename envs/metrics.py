@@ -131,15 +131,15 @@ def hold(rollouts: Rollouts) -> Bool[np.ndarray, "n"]:
     slip = np.linalg.norm(place - place[rows, end][:, None], axis=-1)
     kept = ((slip < HOLD_SLIP) | ~judged).all(axis=1)
     last = rollouts.held.shape[1] - 1 - np.argmax(judged[:, ::-1], axis=1)
-    demonstrated = rises(rollouts, rollouts.object_reference)[rows, end]
+    demonstrated = final_rise(rollouts)
     raised = rises(rollouts, rollouts.object_pose)[rows, last] >= demonstrated / 2
-    return kept & (raised | ~ends_raised(rollouts))
+    return kept & (raised | (demonstrated < RAISED))
 
 
-def ends_raised(rollouts: Rollouts) -> Bool[np.ndarray, "n"]:
-    """Whether the demonstration ends with the object 2 cm above its start, so that there is something to hold."""
+def final_rise(rollouts: Rollouts) -> Float[np.ndarray, "n"]:
+    """How far (m) above its start each demonstration leaves the object; from `RAISED` on there is something to hold."""
     rise = rises(rollouts, rollouts.object_reference)
-    return rise[np.arange(len(rise)), last_counted(rollouts)] >= RAISED
+    return rise[np.arange(len(rise)), last_counted(rollouts)]
 
 
 def last_counted(rollouts: Rollouts) -> np.ndarray:
