@@ -101,7 +101,8 @@ def _spread(name: str, values: Sequence[float]) -> str:
     mean, least, greatest = (score_text(name, float(f(values))) for f in (np.mean, np.min, np.max))
     if least == greatest:
         return mean
-    return f"{mean} ({least.rstrip(' %cm°')} to {greatest.rstrip(' %cm°')})"
+    least, greatest = (text.rstrip(" %cm°").replace("100.0", "100") for text in (least, greatest))
+    return f"{mean} ({least} to {greatest})"
 
 
 def _meanings(ablations: Sequence[Ablation]) -> dict[str, str]:

@@ -27,7 +27,7 @@ from train.interruption import interruptions
 from train.learner import Learner, LearnerState, Networks
 from train.policy import deterministic_policy
 from train.processes import agreed, first_alone_speaks, gathered, is_first, join
-from train.run_folder import RunFolder
+from train.run_folder import RunFolder, run_folder
 from train.sweep import sweepable_command
 from train.unstable import UnstableLog
 
@@ -53,11 +53,15 @@ def train(config: Config, world: World | None = None) -> list[Point]:
         world: its training part, where the caller has made it already.
 
     Raises:
-        InputError: an `out` folder that cannot be written or holds another training, or whatever is wrong with the
-            configuration.
+        InputError: an `out` folder that cannot be written, holds another training or has one under way, or whatever
+            is wrong with the configuration.
         SystemExit: it was interrupted (status 128 and the signal's number); its state is saved.
     """
-    folder = RunFolder(config)
+    with run_folder(config) as folder:
+        return _train(config, world, folder)
+
+
+def _train(config: Config, world: World | None, folder: RunFolder) -> list[Point]:
     world = make_world(config, "train") if world is None else world
     learner = Learner(ParallelEnv(world.env, guard=config.debug.nan_guard), config.ppo)
     state, points, seconds = _start(config, learner, folder)

@@ -30,7 +30,7 @@ def learning_curves(
     empty = [name for name, rows in curves.items() if len(rows) == 0]
     if empty or not curves:
         raise InputError(f"no evaluations to draw for {', '.join(empty) or 'any seed'}; give at least one each")
-    figure = Figure(figsize=(5.2, 3.0), layout="constrained")
+    figure = Figure(figsize=(5.2, 3.3), layout="constrained")
     axes = figure.subplots()
     axes.grid(visible=True)
     axes.tick_params(length=0)
@@ -44,5 +44,5 @@ def learning_curves(
     axes.set_ylim(-0.03, 1.03)
     axes.yaxis.set_major_formatter(ticker.PercentFormatter(1.0))
     axes.set_title(title, loc="left")
-    axes.legend(loc="lower right", ncols=2, handlelength=1.6)
+    figure.legend(loc="outside lower left", ncols=3, handlelength=1.6)  # curves may be anywhere in the axes
     return figure

@@ -20,7 +20,7 @@ from train.evaluation_record import made_of
 from train.experiment import World
 from train.ppo import Point, _write_curve
 from train.results_table import Experiment
-from train.run_folder import RunFolder
+from train.run_folder import run_folder
 from train.seeds import POLICY, REPLAY, ZERO
 
 NO_GRIP = next(variant for variant in VARIANTS if variant.name == "no grip")
@@ -91,7 +91,7 @@ def test_rows_are_means_over_seeds_with_the_least_and_the_greatest():
     unchanged, without = experiment([1.0, 0.9, 0.95]), experiment([0.5, 0.3, 0.4], zero=0.0)
     measured = [(UNCHANGED, unchanged), (RESIDUAL_OFF, unchanged), (ALONE, unchanged), (NO_GRIP, without)]
     table = ablation_table(Ablation("spherical", 9, measured))
-    assert row(table, "as configured")["success"] == "95.0 % (90.0 to 100.0)"
+    assert row(table, "as configured")["success"] == "95.0 % (90.0 to 100)"
     assert row(table, "as configured")["tracking error"] == "0.40 cm", "equal seeds have no range"
     assert (row(table, "as configured")["zero residual"], row(table, "no grip")["zero residual"]) == ("25.0 %", "0.0 %")
     assert row(table, "no grip")["success"] == "40.0 % (30.0 to 50.0)"
@@ -106,7 +106,7 @@ def test_the_page_says_what_is_done_and_what_is_not(tmp_path):
     page, text = (tmp_path / name for name in ("index.html", "ablations.md"))
     for content in (page.read_text(), text.read_text()):
         assert "Not done yet: spherical (tips refined)." in content
-        assert "95.0 % (90.0 to 100.0)" in content
+        assert "95.0 % (90.0 to 100)" in content
         assert "task.grip_force=0" in content
         assert "300,000 control steps" in content
         assert "the command" in content
@@ -190,16 +190,20 @@ def test_a_tiny_training_and_its_baselines(
 
 def test_a_training_from_before_an_option_was_there_goes_on(tiny: Config, tmp_path):
     config = Config(**{**vars(tiny), "out": str(tmp_path)})
-    RunFolder(config)
+    with run_folder(config):
+        pass
     (tmp_path / "state").mkdir()
     written = tmp_path / "config.yaml"
     old = [line for line in written.read_text().splitlines() if not line.strip().startswith("axes:")]
     assert len(old) == len(written.read_text().splitlines()) - 1
     written.write_text("\n".join(old))
-    RunFolder(config)
+    with run_folder(config):
+        pass
     other = plan(["names=[pinch]", "variants=[functional axes]", "seed=0"])[0][0].variants[1][1][0]
-    with pytest.raises(InputError, match=r"holds a training with data.capture.axes=anatomical, now functional"):
-        RunFolder(Config(**{**vars(config), "data": other.data, "task": config.task}))
+    changed = Config(**{**vars(config), "data": other.data, "task": config.task})
+    refused = pytest.raises(InputError, match=r"holds a training with data.capture.axes=anatomical, now functional")
+    with refused, run_folder(changed):
+        pass
 
 
 def test_every_variant_says_why():
