@@ -50,8 +50,8 @@ def test_without_one_the_command_that_trains_is_named(untrained: Config):
         viewer(untrained)
 
 
-@pytest.mark.parametrize("name", FIVE)
-def test_the_policies_of_the_five_types_do_what_the_zero_residual_does_not(name: str):
+@pytest.mark.parametrize("name", [*FIVE, "all"])
+def test_the_policies_that_come_along_do_what_the_zero_residual_does_not(name: str):
     """On the demonstration beside each, from frame 0, and still there five seconds later."""
     config = compose([f"config={name}", "engine=native"])
     config = dataclasses.replace(config, checkpoint=str(included_policy(name)))
