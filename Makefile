@@ -61,7 +61,7 @@ format: $(STAMP)  ## mend what lint can mend
 types: $(STAMP)  ## check the types
 	$(BIN)/pyright
 
-bench: $(STAMP)  ## measure this machine: steps a second of each physics engine, poses a second of the projection
+bench: $(STAMP)  ## measure this machine: engines, solver settings, projection (a quarter of an hour)
 	$(BIN)/python -m train.benchmark
 
 lock: $(STAMP)  ## resolve requirements.lock again from pyproject.toml

@@ -84,4 +84,10 @@ VARIANTS = (
         ("task.assist=300",),
     ),
     Variant("no action filter", "filter", "The residual is what the policy says at once.", ("task.smoothing=0",)),
+    Variant(
+        "no filter and less noise",
+        "filter",
+        "The same, exploring with no more noise than the filter lets through.",
+        ("task.smoothing=0", "ppo.initial_std=0.09"),
+    ),
 )
