@@ -83,7 +83,7 @@ def _alone_in(path: Path) -> Iterator[None]:
     if not is_first():
         yield
         return
-    lock = FileLock(path / ".lock")
+    lock = FileLock(path / "lock")
     try:
         path.mkdir(parents=True, exist_ok=True)
         lock.acquire(blocking=False)

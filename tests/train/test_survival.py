@@ -106,7 +106,7 @@ def test_other_settings_do_not_go_on_but_start_anew_if_told(tiny: Config, world:
 def test_a_second_training_is_kept_out_and_a_killed_one_keeps_nobody_out(tiny: Config, world: World, tmp_path):
     config = shortened(in_folder(tiny, tmp_path), 32)
     code = "import sys, time, filelock; lock = filelock.FileLock(sys.argv[1]); lock.acquire(); print('has it')"
-    command = [sys.executable, "-uc", f"{code}; time.sleep(60)", str(tmp_path / ".lock")]
+    command = [sys.executable, "-uc", f"{code}; time.sleep(60)", str(tmp_path / "lock")]
     other = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     with other:
         try:
@@ -115,7 +115,7 @@ def test_a_second_training_is_kept_out_and_a_killed_one_keeps_nobody_out(tiny: C
             for fresh in (False, True):
                 with pytest.raises(InputError, match=r"another training is under way in .*stop it.*out=FOLDER"):
                     run(dataclasses.replace(config, fresh=fresh), world)
-            assert [path.name for path in tmp_path.iterdir()] == [".lock"]
+            assert [path.name for path in tmp_path.iterdir()] == ["lock"]
         finally:
             other.kill()
     assert [p.steps for p in run(config, world)] == [0, 32]
