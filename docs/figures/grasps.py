@@ -24,8 +24,8 @@ def main(root: Path) -> None:
         with shares() as report:
             folder = make_set(SetSettings(name, people=1, heldout_people=1, trials=2), root, report)
         demonstrations = load_part(folder, "train")
-        rows.append(contact_sheet(demonstrations, twins(demonstrations), rows=1, size=200))
-    picture = Image.fromarray(np.concatenate(rows)).quantize(128)
+        rows.append(contact_sheet(demonstrations, twins(demonstrations), rows=1, size=400))  # twice what is kept
+    picture = Image.fromarray(np.concatenate(rows)).reduce(2).quantize(256)
     picture.save(Path(__file__).with_name("grasps.png"), optimize=True)
 
 

@@ -14,7 +14,7 @@ from train.config import compose
 from train.seeds import POLICY, evaluate_checkpoint
 
 MOMENTS = (0.05, 0.33, 0.55, 0.75, 0.99)  # shares of the demonstration
-SIZE = (300, 300)
+SIZE = (600, 600)  # twice what is kept, so that edges are smooth
 
 
 def main() -> None:
@@ -32,7 +32,7 @@ def main() -> None:
         np.concatenate(list(render_frames(model, take, watched=wanted, size=SIZE)), axis=1)
         for take in (wanted, rollouts.qpos[index, frames])
     ]
-    picture = Image.fromarray(np.concatenate(rows)).quantize(128)
+    picture = Image.fromarray(np.concatenate(rows)).reduce(2).quantize(256)
     picture.save(Path(__file__).with_name("twin.png"), optimize=True)
 
 
