@@ -11,7 +11,7 @@ import contextlib
 import dataclasses
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import jax
@@ -40,6 +40,7 @@ _ENDS = {
     "1000 sweeps": Settings({"iterations": 1000, "tolerance": 0.0}),
     "Newton's": newton(200, tolerance=1e-12, ls_iterations=200),
 }
+_Step = Callable[[PhysicsState, Float[jax.Array, "n 26"]], PhysicsState]
 _SHARES = (50, 90, 99)  # percent of the control steps that end as near as a column says
 
 
@@ -94,13 +95,16 @@ def report(options: Options) -> list[str]:
         for grasp in grasps:
             env = make_world(config("native", grasp, options.demonstrations), "train").env
             state, controls = moments(env, options.worlds)
-            solved = {name: _step(env, settings, state, controls)[0] for name, settings in _ENDS.items()}
+            solved = {name: _ends(_stepper(env, settings), state, controls) for name, settings in _ENDS.items()}
             advance(1)
-            ends, rates = {}, {name: [] for name in COMPARED}
+            steppers = {name: _stepper(env, SWEEP[name]) for name in COMPARED}
+            ends = {name: _ends(step, state, controls) for name, step in steppers.items()}  # compiles too
+            rates = {name: [] for name in COMPARED}
             for _ in range(options.runs):
-                for name in COMPARED:
-                    ends[name], rate = _step(env, SWEEP[name], state, controls)
-                    rates[name].append(rate)
+                for name, step in steppers.items():
+                    began = time.process_time()
+                    _ends(step, state, controls)
+                    rates[name].append(len(controls) * env.engine.substeps / (time.process_time() - began))
                     advance(1)
             figures[grasp] = {
                 name: Figures(float(np.median(rates[name])), *_off(ends[name], solved)) for name in COMPARED
@@ -128,17 +132,15 @@ def moments(env: TrackingEnv, worlds: int) -> tuple[PhysicsState, Float[jax.Arra
     return joined, jnp.asarray(np.concatenate(script.controls[1:]), jnp.float32)
 
 
-def _step(
-    env: TrackingEnv, settings: Settings, state: PhysicsState, controls: Float[jax.Array, "n 26"]
-) -> tuple[Float[np.ndarray, "n q"], float]:
-    """Where one control step with these settings leads, and its physics steps a second of CPU time."""
+def _stepper(env: TrackingEnv, settings: Settings) -> _Step:
+    """Many worlds' control step with these settings."""
     engine = NativeEngine(settings.applied(env.engine.models), env.engine.substeps)
-    step = jax.jit(jax.vmap(engine.step))
-    jax.block_until_ready(step(state, controls))  # compiles, and loads the models
-    began = time.process_time()
-    ended = jax.block_until_ready(step(state, controls))
-    taken = time.process_time() - began
-    return np.asarray(ended.qpos), len(controls) * engine.substeps / taken
+    return jax.jit(jax.vmap(engine.step))
+
+
+def _ends(step: _Step, state: PhysicsState, controls: Float[jax.Array, "n 26"]) -> Float[np.ndarray, "n q"]:
+    """Where one control step leads."""
+    return np.asarray(step(state, controls).qpos)
 
 
 def _off(

@@ -30,7 +30,8 @@ def test_moments_are_states_under_way_and_their_targets_jump(demonstrations):
     state, controls = convergence.moments(env, 3)
     assert controls.shape == (12, 26)
     # Four control steps of three worlds: each goes on from where the one before led.
-    again = convergence._step(env, convergence.Settings(), state, controls)[0].reshape(4, 3, -1)
+    step = convergence._stepper(env, convergence.Settings())
+    again = convergence._ends(step, state, controls).reshape(4, 3, -1)
     np.testing.assert_array_equal(again[:-1], np.asarray(state.qpos).reshape(4, 3, -1)[1:])
     jerks = np.abs(np.diff(np.asarray(controls).reshape(4, 3, 26), 2, axis=0))
     smooth = np.abs(np.diff(np.asarray(env.reference.controls), 2, axis=1))
