@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
-from envs.metrics import MANIP_TRANS, RAISED, last_counted, over_counted, position_error, rises
+from envs.metrics import MANIP_TRANS, RAISED, final_rise, last_counted, over_counted, position_error, rises
 from envs.rollout import Rollouts
 
 FAILURES = ("never lifted", "dropped", "rotated", "late", "strayed")
@@ -21,12 +21,11 @@ def failure_reasons(rollouts: Rollouts, success: Bool[np.ndarray, "n"]) -> tuple
     - strayed: none of these; it was held, but elsewhere.
     """
     rows, end = np.arange(len(success)), last_counted(rollouts)
-    achieved = rises(rollouts, rollouts.object_pose)
-    demonstrated = rises(rollouts, rollouts.object_reference)
-    highest = np.where(rollouts.counted, demonstrated, -np.inf).max(axis=1)
+    achieved, final = rises(rollouts, rollouts.object_pose), final_rise(rollouts)
+    highest = np.where(rollouts.counted, rises(rollouts, rollouts.object_reference), -np.inf).max(axis=1)
     reached = np.where(rollouts.counted, achieved, -np.inf).max(axis=1)
     never_lifted = (highest >= RAISED) & (reached < highest / 2)
-    dropped = (demonstrated[rows, end] >= RAISED) & (achieved[rows, end] < demonstrated[rows, end] / 2)
+    dropped = (final >= RAISED) & (achieved[rows, end] < final / 2)
     rotated = over_counted(position_error(rollouts), rollouts) < MANIP_TRANS["translation"]
     late = _least_delayed_error(rollouts) < MANIP_TRANS["translation"]
     rules = np.stack([never_lifted, dropped, rotated, late, np.ones_like(late)])

@@ -112,11 +112,17 @@ def object_text(thing: ObjectDescription) -> str:
 
 def score_text(name: str, value: float) -> str:
     """A metric's value with its unit."""
+    unit = " cm" if name.endswith("_cm") else "°" if name.endswith("_deg") else "" if name == "add_auc" else " %"
+    return f"{score_number(name, value)}{unit}"
+
+
+def score_number(name: str, value: float) -> str:
+    """A metric's value in its unit, without it."""
     if name.endswith("_cm"):
-        return f"{value:.2f} cm"
+        return f"{value:.2f}"
     if name.endswith("_deg"):
-        return f"{value:.1f}°"
-    return f"{value:.3f}" if name == "add_auc" else f"{100 * value:.1f} %"
+        return f"{value:.1f}"
+    return f"{value:.3f}" if name == "add_auc" else f"{100 * value:.1f}"
 
 
 _REASONS = (
@@ -137,8 +143,7 @@ def _cells(name: str, values: Sequence[float | None]) -> list[str]:
     if len(values) == 1:
         return [mean]
     least, greatest = score_text(name, min(given)), score_text(name, max(given))
-    number = least.removesuffix(" %").removesuffix(" cm").removesuffix("°")
-    return [mean, least if least == greatest else f"{number} to {greatest}"]
+    return [mean, least if least == greatest else f"{score_number(name, min(given))} to {greatest}"]
 
 
 def _outcome(evaluation: Evaluation, demonstration: int) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from envs.score_table import score_text
+from envs.score_table import score_number, score_text
 from mjx_hand.motion.archive import replacing
 from mjx_hand.view.learning_figure import learning_curves
 from mjx_hand.view.report import Headline, Plot, Report, Section, Table, write_report
@@ -98,11 +98,11 @@ def _spread(name: str, values: Sequence[float]) -> str:
     """The mean with its unit, and the range of several values; "" of none."""
     if not values:
         return ""
-    mean, least, greatest = (score_text(name, float(f(values))) for f in (np.mean, np.min, np.max))
+    mean = score_text(name, float(np.mean(values)))
+    least, greatest = (score_number(name, value) for value in (min(values), max(values)))
     if least == greatest:
         return mean
-    least, greatest = (text.rstrip(" %cm°").replace("100.0", "100") for text in (least, greatest))
-    return f"{mean} ({least} to {greatest})"
+    return f"{mean} ({least} to {'100' if greatest == '100.0' else greatest})"
 
 
 def _meanings(ablations: Sequence[Ablation]) -> dict[str, str]:

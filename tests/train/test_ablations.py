@@ -1,6 +1,5 @@
 """Ablations: what is planned, what is kept, what the page says; and one real run over a tiny training."""
 
-import dataclasses
 import json
 import shutil
 from collections.abc import Sequence
@@ -20,7 +19,7 @@ from train.evaluation_record import made_of
 from train.experiment import World
 from train.ppo import Point, _write_curve
 from train.results_table import Experiment
-from train.run_folder import run_folder
+from train.run_folder import _plain, _settings, run_folder
 from train.seeds import POLICY, REPLAY, ZERO
 
 NO_GRIP = next(variant for variant in VARIANTS if variant.name == "no grip")
@@ -48,22 +47,9 @@ def test_every_variant_changes_what_it_says_and_nothing_else():
     (unchanged,) = planned.variants[0][1]
     for variant, (config,) in planned.variants:
         said = {override.partition("=")[0] for override in variant.overrides}
-        now, before = leaves(config), leaves(unchanged)
+        now, before = _settings(_plain(config)), _settings(_plain(unchanged))
         assert {name for name in now if now[name] != before[name]} == said, variant.name
         assert bool(said) == (variant.learns and variant != UNCHANGED)
-
-
-def leaves(config: Config) -> dict[str, Any]:
-    """Every option of what is learned from and how, by its dotted name."""
-    found: dict[str, Any] = {}
-    waiting = [(name, dataclasses.asdict(getattr(config, name))) for name in ("data", "task", "ppo")]
-    while waiting:
-        name, value = waiting.pop()
-        if isinstance(value, dict):
-            waiting += [(f"{name}.{key}", below) for key, below in value.items()]
-        else:
-            found[name] = value
-    return found
 
 
 def test_the_plan_takes_names_variants_and_overrides():
