@@ -6,9 +6,12 @@ STAMP := $(VENV)/.installed
 PIP_FLAGS := --quiet --disable-pip-version-check
 # A file's tests stay with one worker: they share hands and compiled functions.
 WORKERS ?= 2
+# The environment of the newest Python here, and the Warp that pyproject.toml names.
+NEWEST := .venv-newest
+WARP := $(shell sed -n 's/^warp = .*warp-lang==\([0-9.]*\).*/\1/p' pyproject.toml)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo results ablations test test-slow lint format types bench lock clean
+.PHONY: help setup demo results ablations test test-slow smoke lint format types bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -49,6 +52,19 @@ test: $(STAMP)  ## run the tests
 
 test-slow: $(STAMP)  ## run the tests that take more than a minute each
 	$(BIN)/python -m pytest -m slow
+
+smoke: $(STAMP)  ## run a few tests, and a tiny training on every engine, under the newest Python here with its newest JAX
+	@set -e; newest=$$(.ci/newest-python); \
+	if [ -z "$$newest" ]; then echo "make smoke: no Python 3.12 or 3.13 here: newest JAX not tested"; exit 0; fi; \
+	if [ ! -f $(NEWEST)/.installed ] || [ requirements.lock -nt $(NEWEST)/.installed ]; then \
+	  echo "making $(NEWEST) with $$newest"; \
+	  $(BIN)/uv venv --quiet --clear --python "$$newest" $(NEWEST); \
+	  $(BIN)/uv pip install --quiet --python $(NEWEST)/bin/python --require-hashes -r requirements.lock; \
+	  $(BIN)/uv pip install --quiet --python $(NEWEST)/bin/python --no-deps -e . warp-lang==$(WARP); \
+	  touch $(NEWEST)/.installed; \
+	fi; \
+	$(NEWEST)/bin/python -c 'import jax, platform; print(f"Python {platform.python_version()}, jax {jax.__version__}")'; \
+	$(NEWEST)/bin/python -m pytest -m "" tests/projection/test_project.py tests/train/test_device.py tests/train/test_every_engine.py
 
 lint: $(STAMP)  ## check style and formatting
 	$(BIN)/ruff check .

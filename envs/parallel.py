@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from brax.envs.base import Env, State
 from jaxtyping import Array, Float, Int
 
-from envs.tracking import TrackingEnv, Twin, twin_of
+from envs.tracking import Tables, TrackingEnv, Twin, twin_of
 from mjx_hand.pytree import pytree
 
 
@@ -48,6 +48,10 @@ class ParallelEnv(Env):
     @property
     def backend(self) -> str:
         return self.env.backend
+
+    def with_tables(self, tables: Tables) -> "ParallelEnv":
+        """As `TrackingEnv.with_tables`."""
+        return ParallelEnv(self.env.with_tables(tables), self.guard)
 
     def reset(self, rng: Array) -> State:
         """One state a key; rng has a leading axis."""

@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 from envs.observation import wrist_rotation
 from envs.rollout import Rollouts
 from envs.scene import NUM_WRIST
-from envs.tracking import TrackingEnv, twin_of
+from envs.tracking import Tables, TrackingEnv, twin_of
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics, stack_hands, tip_positions
 
@@ -23,31 +23,38 @@ def zero_residual(parameters: object, observation: Float[Array, "n o"]) -> Float
 
 
 def make_roll_out(
-    env: TrackingEnv, hands: Sequence[RigidHand], policy: Callable[[object, Array], Array], hold: float = 0.0
+    env: TrackingEnv,
+    hands: Sequence[RigidHand],
+    policy: Callable[[object, Array], Array],
+    hold: float = 0.0,
+    repeats: int = 1,
 ) -> Callable[[object], Rollouts]:
     """A function from a policy's parameters to the rollouts of every demonstration of `env`; compiled once.
 
-    Nothing ends a rollout early: a dropped object counts in every frame after it.
+    Nothing ends a rollout early: a dropped object counts in every frame after it. All rollouts run side by side.
 
     Args:
         env: the environment.
         hands: the twin's hand for each demonstration.
         policy: from (parameters, observations of all worlds) to actions.
         hold: how long the last target is held on after each demonstration (s).
+        repeats: rollouts of each demonstration, one set after the other. They differ where an engine adds forces up in
+            an order that it does not keep, as on a GPU; the native engine's are the same to the last bit.
     """
-    length = np.asarray(env.reference.length)
+    which = np.tile(np.arange(env.num_demonstrations), repeats)
+    length = np.asarray(env.reference.length)[which]
     steps = int(length.max()) - 1 + round(hold * env.fps)
-    bodies = stack_hands(hands)
 
     @jax.jit
-    def run(parameters: object) -> tuple[Array, Array, Array]:
+    def run(parameters: object, tables: Tables) -> tuple[Array, Array, Array]:
+        given = env.with_tables(tables)
+
         def step(state, _):  # type: ignore[no-untyped-def]
-            state = jax.vmap(env.step)(state, policy(parameters, state.obs))
+            state = jax.vmap(given.step)(state, policy(parameters, state.obs))
             physics = twin_of(state).physics
             return state, (physics.qpos, physics.sensordata, state.reward)
 
-        count = env.num_demonstrations
-        first = jax.vmap(env.start)(jnp.arange(count), jnp.zeros(count, int))
+        first = jax.vmap(given.start)(jnp.asarray(which, jnp.int32), jnp.zeros(len(which), jnp.int32))
         physics = twin_of(first).physics
         start = (physics.qpos, physics.sensordata, first.reward)
         _, rest = jax.lax.scan(step, first, length=steps)
@@ -65,19 +72,19 @@ def make_roll_out(
 
     # After a demonstration its last frame is the reference.
     frame = np.minimum(np.arange(steps + 1)[None], length[:, None] - 1)
-    rows = np.arange(len(length))[:, None]
-    reference = np.asarray(env.reference.targets)[rows, frame]
-    pose = np.asarray(env.reference.object_pose)[rows, frame]
-    wanted_joints, wanted_tips = (np.asarray(a) for a in centres(reference, env.reference.base, bodies))
+    reference = np.asarray(env.reference.targets)[which[:, None], frame]
+    pose = np.asarray(env.reference.object_pose)[which[:, None], frame]
+    base, bodies = env.reference.base[which], jax.tree.map(lambda leaf: leaf[which], stack_hands(hands))
+    wanted_joints, wanted_tips = (np.asarray(a) for a in centres(reference, base, bodies))
     time = np.arange(steps + 1)[None]
     counted = time < length[:, None]
     held = (time >= length[:, None]) & (time < length[:, None] + round(hold * env.fps))
 
     def roll_out(parameters: object) -> Rollouts:
-        qpos, sensors, reward = run(parameters)
-        joints, _ = centres(qpos[..., :_NUM_TARGETS], env.reference.base, bodies)
+        qpos, sensors, reward = run(parameters, env.tables)
+        joints, _ = centres(qpos[..., :_NUM_TARGETS], base, bodies)
         return Rollouts(
-            demonstration=np.arange(len(length)),
+            demonstration=which,
             qpos=np.asarray(qpos),
             object_pose=np.asarray(qpos[..., _NUM_TARGETS:]),
             object_reference=pose,

@@ -4,9 +4,10 @@ target(t) = demonstration(t) + grip(t) + residual(t), the first led by the contr
 residual <- tau residual + (1 - tau) scale action (arXiv 2512.07359, section IV).
 """
 
+import copy
 import dataclasses
 from collections.abc import Sequence
-from typing import cast
+from typing import Any, cast
 
 import jax
 import jax.numpy as jnp
@@ -43,6 +44,28 @@ class Twin:
     residual: Float[Array, "*b 26"]
 
 
+@pytree
+class Tables:
+    """What an environment looks up: arrays that a compiled function can be given as an argument.
+
+    What was compiled over `env.with_tables(argument)` runs any other set of equally many, equally long demonstrations.
+
+    Attributes:
+        reference: the demonstrations and their controls.
+        starts: the engine's state at every frame of every demonstration.
+        inertia: mass (kg) and mean moment of inertia (kg m2) of each demonstration's object.
+        low, high: limits of the targets (m, rad).
+        engine: the engine's own (`Engine.tables`).
+    """
+
+    reference: Reference
+    starts: PhysicsState
+    inertia: Float[Array, "d 2"]
+    low: Float[Array, "26"]
+    high: Float[Array, "26"]
+    engine: Any
+
+
 def twin_of(state: State) -> Twin:
     """What a state of `TrackingEnv` carries; Brax's own type for it is that of its physics."""
     return cast(Twin, state.pipeline_state)
@@ -74,7 +97,7 @@ class TrackingEnv(Env):
     ):
         self.task = Task() if task is None else task
         gains = Gains() if gains is None else gains
-        self.reference = _kept_reference(demonstrations, hands, self.task.grip_force, gains)
+        reference = _kept_reference(demonstrations, hands, self.task.grip_force, gains)
         self.assisted = self.task.assist > 0
         self.models = demonstration_models(demonstrations, hands, gains=gains, assisted=self.assisted)
         self.engine = make_engine(engine, self.models, self.task.substeps)
@@ -86,13 +109,34 @@ class TrackingEnv(Env):
                 f"resample them to {1 / self.dt:g} frames/s"
             )
         low, high = self.models[0].actuator_ctrlrange[: self.action_size].T
-        self._low, self._high = jnp.asarray(low, jnp.float32), jnp.asarray(high, jnp.float32)
-        self._inertia = jnp.array([[m.body(OBJECT).mass[0], m.body(OBJECT).inertia.mean()] for m in self.models])
-        self._starts = self._start_table()
+        self.tables = Tables(
+            reference=reference,
+            starts=self._start_table(reference),
+            inertia=jnp.array([[m.body(OBJECT).mass[0], m.body(OBJECT).inertia.mean()] for m in self.models]),
+            low=jnp.asarray(low, jnp.float32),
+            high=jnp.asarray(high, jnp.float32),
+            engine=self.engine.tables,
+        )
+
+    def with_tables(self, tables: Tables) -> "TrackingEnv":
+        """The same environment over another set's tables, which may be arguments of a function that is compiled."""
+        other = copy.copy(self)
+        other.tables = tables
+        other.engine = self.engine.with_tables(tables.engine)
+        return other
+
+    @property
+    def reference(self) -> Reference:
+        return self.tables.reference
 
     @property
     def num_demonstrations(self) -> int:
         return len(self.models)
+
+    @property
+    def num_frames(self) -> int:
+        """Of the longest demonstration."""
+        return self.reference.targets.shape[1]
 
     @property
     def action_size(self) -> int:
@@ -117,7 +161,7 @@ class TrackingEnv(Env):
 
     def start(self, demonstration: Int[Array, ""], frame: Int[Array, ""]) -> State:
         """The state at a frame of a demonstration; frame 0 is the unassisted start that evaluations use."""
-        physics = jax.tree.map(lambda table: table[demonstration, frame], self._starts)
+        physics = jax.tree.map(lambda table: table[demonstration, frame], self.tables.starts)
         twin = Twin(
             physics=physics,
             demonstration=jnp.asarray(demonstration, jnp.int32),
@@ -171,13 +215,13 @@ class TrackingEnv(Env):
         residual = task.smoothing * twin.residual + (1 - task.smoothing) * residual_scale(task) * action
         frame = jnp.minimum(twin.frame + 1, self.reference.length[twin.demonstration] - 1)
         target = self.reference.controls[twin.demonstration, frame] + residual
-        return frame, residual, jnp.clip(target, self._low, self._high)
+        return frame, residual, jnp.clip(target, self.tables.low, self.tables.high)
 
     def _assistance(self, twin: Twin, frame: Int[Array, ""], progress: Float[Array, ""]) -> Float[Array, "6"]:
         """The virtual object controller's force (N, world) and torque (N m, the object's axes)."""
         stiffness = self.task.assist_stiffness(progress)
         damping = 2 * jnp.sqrt(stiffness)
-        mass, inertia = self._inertia[twin.demonstration]
+        mass, inertia = self.tables.inertia[twin.demonstration]
         poses = self.reference.object_pose[twin.demonstration]
         now, wanted = poses[twin.frame], poses[frame]
         thing, speed = twin.physics.qpos[self.action_size :], twin.physics.qvel[self.action_size :]
@@ -198,13 +242,14 @@ class TrackingEnv(Env):
         turn = quaternion_difference(pose[3:], thing[3:])
         return jnp.linalg.norm(thing[:3] - pose[:3]), jnp.sqrt(jnp.sum(turn**2) + 1e-12)
 
-    def _replayed(self) -> dict[str, np.ndarray]:
-        states = assisted_replay(self.models, self.reference, self.task.substeps)
-        return {name: np.asarray(a, np.float32) for name, a in zip(("qpos", "qvel", "ctrl"), states, strict=True)}
-
-    def _start_table(self) -> PhysicsState:
+    def _start_table(self, reference: Reference) -> PhysicsState:
         """The engine's state at every frame of every demonstration, so that a reset is a look-up."""
-        replayed = kept(self._replayed, *(model_bytes(m) for m in self.models), self.reference, self.task.substeps)
+
+        def compute() -> dict[str, np.ndarray]:
+            states = assisted_replay(self.models, reference, self.task.substeps)
+            return {name: np.asarray(a, np.float32) for name, a in zip(("qpos", "qvel", "ctrl"), states, strict=True)}
+
+        replayed = kept(compute, *(model_bytes(m) for m in self.models), reference, self.task.substeps)
         qpos, qvel, ctrl = (replayed[name] for name in ("qpos", "qvel", "ctrl"))
         count, frames = qpos.shape[:2]
         variant = np.repeat(np.arange(count, dtype=np.int32), frames)

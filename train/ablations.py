@@ -37,7 +37,8 @@ class Plan:
 
     @property
     def steps(self) -> int:
-        return self.variants[0][1][0].ppo.num_timesteps
+        ppo = self.variants[0][1][0].ppo
+        return ppo.num_timesteps or ppo.budget * ppo.steps_per_update
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -18,6 +18,7 @@ from envs.settings import made_of
 from envs.task import Task
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
+from train.device import DEVICES, use_device, with_device
 from train.options import Checks, Debug, Distributed, Play, Ppo
 
 
@@ -27,7 +28,8 @@ class Config:
 
     Attributes:
         name: of the experiment.
-        engine: auto, native, mjx or warp.
+        engine: auto, native, mjx or warp; auto picks by the device (docs/training.md).
+        device: cpu or gpu: what JAX computes on, and with it how many worlds (`configs/device`).
         seed: of networks, resets and actions.
         seeds: for commands that take several seeds of one experiment; empty for `seed` alone.
         out: folder for checkpoints, logs and results.
@@ -45,6 +47,7 @@ class Config:
 
     name: str = "pinch"
     engine: str = "auto"
+    device: str = "cpu"
     seed: int = 0
     seeds: tuple[int, ...] = ()
     out: str = "outputs/${name}/seed${seed}"
@@ -62,6 +65,8 @@ class Config:
     def __post_init__(self):
         if self.engine not in ("auto", *ENGINES):
             raise InputError(f"engine is {self.engine!r}; valid: auto, {', '.join(ENGINES)}")
+        if self.device not in DEVICES:
+            raise InputError(f"device is {self.device!r}; valid: auto, {', '.join(DEVICES)}")
 
 
 def compose(overrides: Sequence[str] = ()) -> Config:
@@ -84,9 +89,10 @@ def compose_seeds(overrides: Sequence[str] = ()) -> list[Config]:
 
 def _composed(overrides: Sequence[str]) -> DictConfig:
     _store_schema()
+    overrides = with_device(overrides)
     try:
         with hydra.initialize_config_module("configs", version_base=None):
-            base = hydra.compose("train", [o for o in overrides if o.startswith("config=")])
+            base = hydra.compose("train", [o for o in overrides if o.startswith(("config=", "device="))])
             for override in overrides:
                 _check_key(base, override.split("=", 1)[0].lstrip("+~"))
             return hydra.compose("train", list(overrides))
@@ -133,12 +139,17 @@ def command(task: Callable[[Config], object]) -> None:
 
     Input that cannot be used ends the process with one line and status 2.
     """
-    _command(lambda composed: task(to_config(composed)))
+    _command(lambda composed: task(_on_device(to_config(composed))))
 
 
 def command_of_seeds(task: Callable[[Sequence[Config]], object]) -> None:
     """Like `command`, for a task that takes the configurations of several seeds (`seeds=[0,1,2]`)."""
-    _command(lambda composed: task(of_seeds(composed)))
+    _command(lambda composed: task([_on_device(config) for config in of_seeds(composed)]))
+
+
+def _on_device(config: Config) -> Config:
+    use_device(config.device, config.distributed)
+    return config
 
 
 def _command(task: Callable[[DictConfig], object]) -> None:
@@ -156,6 +167,10 @@ def _command(task: Callable[[DictConfig], object]) -> None:
             of_seeds(_composed(arguments))
         except InputError as error:
             refuse(error)
+    try:
+        sys.argv[1:] = with_device(arguments)
+    except InputError as error:
+        refuse(error)
     hydra.main(version_base=None, config_path="pkg://configs", config_name="train")(job)()
 
 
@@ -183,7 +198,7 @@ def _make_writable(node: Any) -> None:
 
 
 def _check_key(base: DictConfig, key: str) -> None:
-    if key == "config" or key.startswith("hydra"):
+    if key in ("config", "device") or key.startswith("hydra"):
         return
     node: Any = base
     parts = key.split(".")

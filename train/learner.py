@@ -11,6 +11,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 import optax
 from brax.envs.base import State
 from brax.training import acting
@@ -19,6 +20,7 @@ from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from jaxtyping import Array, Float, Int, UInt
 
 from envs.parallel import ParallelEnv
+from envs.tracking import Tables
 from mjx_hand.errors import InputError
 from mjx_hand.pytree import pytree
 from train.options import Ppo
@@ -66,16 +68,13 @@ class Learner:
     Attributes:
         steps_per_update: control steps of all worlds together.
         template: shapes and types of a state.
-        initial: the state from a seed, before any learning.
-        update: one unroll of every world and the gradient steps on it, given the state and what share of the training
-            is over; also metrics, means over the update: `training/...` of the learner, `episode/...` of the episodes
-            that ended in it (sums over an episode; absent where none ended). The state that goes in is given up.
+        tables: the environment's, laid out over the devices.
     """
 
     def __init__(self, env: ParallelEnv, ppo: Ppo):
         devices = jax.devices()
         _check_split(ppo, len(devices))
-        self.steps_per_update = ppo.num_envs * ppo.unroll_length
+        self.steps_per_update = ppo.steps_per_update
         self.mesh = Mesh(devices, (_AXIS,))
         everywhere, split = PartitionSpec(), PartitionSpec(_AXIS)
         made = network_factory(ppo)(env.observation_size, env.action_size)
@@ -103,24 +102,92 @@ class Learner:
         self._shardings = jax.tree.map(
             lambda spec: NamedSharding(self.mesh, spec), specs, is_leaf=lambda node: isinstance(node, PartitionSpec)
         )
-        reset = spread(env.reset, in_specs=split, out_specs=split)
-        self.initial: Callable[[int], LearnerState] = jax.jit(
-            functools.partial(initial, reset=reset), out_shardings=self._shardings
+        reset = spread(
+            lambda keys, tables: env.with_tables(tables).reset(keys), in_specs=(split, everywhere), out_specs=split
+        )
+        # Tables are arguments: as constants, each new set of demonstrations would compile anew.
+        self._initial = jax.jit(
+            lambda seed, tables: initial(seed, lambda keys: reset(keys, tables)), out_shardings=self._shardings
         )
         update = functools.partial(_update, env=env, made=made, optimizer=optimizer, ppo=ppo, devices=len(devices))
-        self.update: Callable[[LearnerState, float], tuple[LearnerState, Mapping[str, Array]]] = jax.jit(
-            spread(update, in_specs=(specs, everywhere), out_specs=(specs, everywhere)),
+        self._everywhere = NamedSharding(self.mesh, everywhere)
+        self._update = jax.jit(
+            spread(update, in_specs=(specs, everywhere, everywhere), out_specs=(specs, everywhere)),
             donate_argnums=0,
-            out_shardings=(self._shardings, NamedSharding(self.mesh, everywhere)),
+            out_shardings=(self._shardings, self._everywhere),
         )
+        self.tables = self.placed_tables(env.env.tables)
 
     def placed(self, state: LearnerState) -> LearnerState:
         """A state of NumPy arrays, the same in every process, laid out over the devices."""
-        return jax.tree.map(
-            lambda leaf, sharding: jax.make_array_from_callback(leaf.shape, sharding, lambda index: leaf[index]),
-            state,
+        return jax.tree.map(_placed, state, self._shardings)
+
+    def placed_tables(self, tables: Tables) -> Tables:
+        """Tables, the same in every process, on every device."""
+        return jax.tree.map(lambda leaf: _placed(np.asarray(leaf), self._everywhere), tables)
+
+    def initial(self, seed: int, tables: Tables | None = None) -> LearnerState:
+        """The state from a seed, before any learning; tables as of `update`."""
+        return self._initial(seed, self._given(tables))
+
+    def update(
+        self, state: LearnerState, progress: float, tables: Tables | None = None
+    ) -> tuple[LearnerState, Mapping[str, Array]]:
+        """One unroll of every world and the gradient steps on it.
+
+        Args:
+            state: given up: its memory is that of the state that comes out.
+            progress: the share of the training that is over.
+            tables: of another set of demonstrations, from `placed_tables`; the environment's own if None.
+
+        Returns:
+            The state after it, and means over the update: `training/...` of the learner, `episode/...` of the episodes
+            that ended in it (sums over an episode; NaN where none ended).
+
+        Raises:
+            InputError: tables of another size than the environment's.
+        """
+        return self.compiled(state, np.float32(progress), self._given(tables))
+
+    def _given(self, tables: Tables | None) -> Tables:
+        if tables is None:
+            return self.tables
+        _check_tables(tables, self.tables)
+        return tables
+
+    @functools.cached_property
+    def lowered(self) -> jax.stages.Lowered:
+        """The update as a program, a function of state, progress (float32) and tables."""
+        state = jax.tree.map(
+            lambda leaf, sharding: jax.ShapeDtypeStruct(leaf.shape, leaf.dtype, sharding=sharding),
+            self.template,
             self._shardings,
         )
+        return self._update.lower(state, jax.ShapeDtypeStruct((), jnp.float32), self.tables)
+
+    @functools.cached_property
+    def compiled(self) -> jax.stages.Compiled:
+        """The same, compiled."""
+        return self.lowered.compile()
+
+    def memory(self) -> int | None:
+        """Bytes of each device that an update needs, state and tables included; None if XLA does not tell."""
+        told = self.compiled.memory_analysis()
+        if told is None:
+            return None
+        held = told.argument_size_in_bytes + told.output_size_in_bytes - told.alias_size_in_bytes
+        return held + told.temp_size_in_bytes
+
+
+def _placed(leaf: np.ndarray, sharding: NamedSharding) -> Array:
+    return jax.make_array_from_callback(leaf.shape, sharding, lambda index: leaf[index])
+
+
+def _check_tables(tables: Tables, own: Tables) -> None:
+    given, wanted = ([(leaf.shape, leaf.dtype) for leaf in jax.tree.leaves(each)] for each in (tables, own))
+    if given != wanted:
+        sizes = ["{} demonstrations x {} frames".format(*t.reference.targets.shape[:2]) for t in (tables, own)]
+        raise InputError(f"tables of {sizes[0]} do not fit a learner for {sizes[1]}; make a learner for them")
 
 
 def _check_split(ppo: Ppo, devices: int) -> None:
@@ -134,6 +201,7 @@ def _check_split(ppo: Ppo, devices: int) -> None:
 def _update(
     state: LearnerState,
     progress: Float[Array, ""],
+    tables: Tables,
     *,
     env: ParallelEnv,
     made: networks.PPONetworks,
@@ -142,6 +210,7 @@ def _update(
     devices: int,
 ) -> tuple[LearnerState, dict[str, Array]]:
     """One update on this device's worlds, its gradients averaged over all devices."""
+    env = env.with_tables(tables)
     key, here = jax.random.split(state.key)
     here = jax.random.fold_in(here, jax.lax.axis_index(_AXIS))
     acting_key, shuffle_key = jax.random.split(here)

@@ -11,7 +11,8 @@ class Ppo:
     """Proximal policy optimisation (Schulman et al. 2017), as `brax.training.agents.ppo` has it.
 
     Attributes:
-        num_timesteps: control steps of all worlds together.
+        num_updates: the budget, whatever the number of worlds: an update is `num_envs * unroll_length` control steps.
+        num_timesteps: the budget in control steps of all worlds together, in place of num_updates where given.
         num_envs: worlds in parallel; a multiple of num_minibatches.
         unroll_length: steps of each world between updates.
         num_minibatches, num_updates_per_batch: gradient steps an update are their product.
@@ -20,7 +21,8 @@ class Ppo:
         initial_std: standard deviation of actions at first; a residual of 1 is the task's full range.
     """
 
-    num_timesteps: int = 600_000
+    num_updates: int = 147
+    num_timesteps: int | None = None
     num_envs: int = 256
     unroll_length: int = 16
     num_minibatches: int = 8
@@ -39,10 +41,18 @@ class Ppo:
         for name in ("policy_layers", "value_layers"):
             if any(size < 1 for size in getattr(self, name)):
                 raise InputError(f"ppo.{name} is {list(getattr(self, name))}; every layer needs at least 1 unit")
-        whole = ("num_timesteps", "num_envs", "unroll_length", "num_minibatches", "num_updates_per_batch")
-        for name in (*whole, "learning_rate", "clipping_epsilon", "max_grad_norm", "initial_std"):
-            if not 0 < getattr(self, name) < math.inf:
-                raise InputError(f"ppo.{name} is {getattr(self, name)}; it must be a number above 0")
+        whole = ("num_updates", "num_timesteps", "num_envs", "unroll_length", "num_minibatches")
+        for name in (
+            *whole,
+            "num_updates_per_batch",
+            "learning_rate",
+            "clipping_epsilon",
+            "max_grad_norm",
+            "initial_std",
+        ):
+            value = getattr(self, name)
+            if value is not None and not 0 < value < math.inf:
+                raise InputError(f"ppo.{name} is {value}; it must be a number above 0")
         if not 0 <= self.entropy_cost < math.inf:
             raise InputError(f"ppo.entropy_cost is {self.entropy_cost}; it must be a number that is not negative")
         for name in ("discounting", "gae_lambda"):
@@ -54,22 +64,33 @@ class Ppo:
                 f"give for example {max(self.num_envs // self.num_minibatches, 1) * self.num_minibatches}"
             )
 
+    @property
+    def steps_per_update(self) -> int:
+        """Control steps of all worlds together between two updates of the networks."""
+        return self.num_envs * self.unroll_length
+
+    @property
+    def budget(self) -> int:
+        """Updates until the training is over; the last one ends at or after `num_timesteps`."""
+        return self.num_updates if self.num_timesteps is None else -(-self.num_timesteps // self.steps_per_update)
+
 
 @dataclasses.dataclass(frozen=True)
 class Checks:
     """Evaluation while training, on the training demonstrations from frame 0, unassisted.
 
     Attributes:
-        every: control steps between evaluations; the best policy so far is kept.
+        every: control steps between evaluations; the best policy so far is kept. null: as often as fits into a tenth
+            of the training's time (`train.cadence`).
         stop_at: stop once this share succeeds (ManipTrans object); above 1, never.
     """
 
-    every: int = 100_000
+    every: int | None = None
     stop_at: float = 2.0
 
     def __post_init__(self):
-        if self.every < 1:
-            raise InputError(f"checks.every is {self.every}; it must be at least 1 step")
+        if self.every is not None and self.every < 1:
+            raise InputError(f"checks.every is {self.every}; it must be at least 1 step, or null")
         if math.isnan(self.stop_at):
             raise InputError("checks.stop_at is nan; give a share such as 0.97, or 2 to never stop early")
 

@@ -20,8 +20,10 @@ from envs.parallel import ParallelEnv
 from envs.rolling import make_roll_out
 from mjx_hand.motion.archive import replacing
 from mjx_hand.view.progress import counter
+from train.cadence import rollouts_per_demonstration, updates_between
 from train.checkpoint import Checkpoint, save_checkpoint
 from train.config import Config
+from train.device import described
 from train.experiment import World, make_world
 from train.interruption import interruptions
 from train.learner import Learner, LearnerState, Networks
@@ -71,7 +73,7 @@ def _train(config: Config, world: World | None, folder: RunFolder) -> list[Point
         return run.points
     print(
         f"training {config.name!r} on {world.env.num_demonstrations} demonstrations, engine {world.env.engine.name}, "
-        f"{config.ppo.num_envs} worlds; results in {folder.path}",
+        f"learner on {described()}, {config.ppo.num_envs} worlds; results in {folder.path}",
         flush=True,
     )
     if seconds:
@@ -81,6 +83,8 @@ def _train(config: Config, world: World | None, folder: RunFolder) -> list[Point
     if stopped:
         print(f"stopped at {run.steps:,} steps and saved; the same command goes on from there", flush=True)
         raise SystemExit(128 + stopped)
+    took = time.monotonic() - run.start - seconds
+    print(f"evaluations took {run.evaluating:.0f} of {took:.0f} s ({run.evaluating / took:.0%})")
     if count := int(run.state.unstable):
         print(f"{count} simulations diverged and were started anew; debug.nan_guard=true keeps their states")
     return run.points
@@ -111,15 +115,16 @@ class _Run:
         self.config, self.world, self.learner, self.folder = config, world, learner, folder
         self.state, self.points = state, points
         self.updates = int(state.updates)
-        each = learner.steps_per_update
-        self.last = -(-config.ppo.num_timesteps // each)
-        self.between = max(config.checks.every // each, 1)
+        self.last = config.ppo.budget
+        self.repeats = rollouts_per_demonstration(world.env)
+        self.between = updates_between(config.checks, config.ppo, world.env, self.repeats)
+        self.evaluating = 0.0  # s
         self.start = time.monotonic() - seconds
         policy = deterministic_policy(config.ppo, world.env.observation_size, world.env.action_size)
         self.unstable = (
             UnstableLog(folder.path / "unstable", world.env, config.seed) if config.debug.nan_guard else None
         )
-        self.roll_out = make_roll_out(world.env, world.hands, policy)
+        self.roll_out = make_roll_out(world.env, world.hands, policy, repeats=self.repeats)
 
     @property
     def steps(self) -> int:
@@ -150,6 +155,8 @@ class _Run:
                     return stopped
                 self.state, metrics = self.learner.update(self.state, self.updates / self.last)
                 self.updates += 1
+                if untrained is not None:
+                    self._say_memory()
                 if time.monotonic() - logged > _LOG_SECONDS:
                     logged = time.monotonic()
                     self._log(writer, metrics)
@@ -178,6 +185,7 @@ class _Run:
 
     def _check(self, writer: SummaryWriter, params: Networks, steps: int) -> None:
         """All training demonstrations from frame 0; keeps the best policy, because curves are not monotone."""
+        began = time.monotonic()
         scores = evaluate(self.roll_out(params.policy), [d.object for d in self.world.demonstrations]).rows()
         point = Point(
             steps=steps,
@@ -208,6 +216,12 @@ class _Run:
             f"tracking error {point.tracking_error_cm:.2f} cm",
             flush=True,
         )
+        self.evaluating += time.monotonic() - began
+
+    def _say_memory(self) -> None:
+        if (needed := self.learner.memory()) is not None:
+            each = needed * self.learner.mesh.size / self.config.ppo.num_envs
+            print(f"  an update needs {needed / 1e6:,.0f} MB, {each / 1e3:,.0f} kB for each world", flush=True)
 
     def _save(self) -> None:
         state = gathered(self.state)

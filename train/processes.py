@@ -19,12 +19,12 @@ from train.options import Distributed
 
 
 def join(settings: Distributed) -> None:
-    """Join the other processes, before anything is computed; nothing to do for a single one.
+    """Join the other processes, before anything is computed; nothing to do for a single one, or once more.
 
     Raises:
         InputError: the coordinator or the others do not answer.
     """
-    if settings.processes == 1:
+    if settings.processes == 1 or jax.distributed.is_initialized():
         return
     try:
         jax.distributed.initialize(

@@ -28,6 +28,8 @@ _FREE = (
     "debug",
     "play",
     "checks",
+    "device",
+    "ppo.num_updates",
     "ppo.num_timesteps",
 )
 

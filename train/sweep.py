@@ -31,6 +31,7 @@ from rich.table import Table
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 from train.config import Config, command, compose, one_line, refuse, to_config
+from train.device import use_device, with_device
 from train.interruption import left_to_others
 
 LOG = "log.txt"
@@ -70,6 +71,7 @@ class _Job:
         task = getattr(importlib.import_module(self.module), self.name)
         enable_compile_cache()
         try:
+            use_device(config.device, config.distributed)
             with _log_of(config):
                 return Outcome(config, task(config) or {})
         except SystemExit as stop:
@@ -144,7 +146,7 @@ def _launched(job: _Job, overrides: Sequence[str]) -> list[Outcome]:
             left_to_others() if elsewhere else contextlib.nullcontext(),
         ):
             running: Any = GlobalHydra.instance().hydra
-            batches = running.multirun("train", job, list(overrides))
+            batches = running.multirun("train", job, with_device(overrides))
     except MissingConfigException as error:
         hint = "; launchers come with: pip install 'mjx-hand[sweep]'" if elsewhere else ""
         raise InputError(one_line(error) + hint) from None

@@ -48,11 +48,20 @@ class Engine(Protocol):
         name: one of `ENGINES`.
         models: the compiled family, with this engine's solver settings.
         substeps: physics steps a control step.
+        tables: the family's numbers, as arrays that a compiled function can be given as an argument.
     """
 
     name: str
     models: Sequence[mujoco.MjModel]
     substeps: int
+    tables: Any
+
+    def with_tables(self, tables: Any) -> "Engine":
+        """The same engine over the numbers of another family of equally many models of the same structure.
+
+        A function compiled over `with_tables(argument)` steps any such family without compiling anew.
+        """
+        ...
 
     def reset(
         self,

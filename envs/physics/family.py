@@ -19,19 +19,19 @@ class Family:
 
     Attributes:
         structure: of each model as a pytree.
-        shared: leaves of the first model.
-        varying: by position among the leaves, those that differ between models, stacked.
+        varying: positions among the leaves of those that differ between models.
+        leaves: of the first model; those that differ, of all models, stacked.
     """
 
     structure: Any
-    shared: tuple[Any, ...]
-    varying: dict[int, Array]
+    varying: tuple[int, ...]
+    leaves: tuple[Array, ...]
 
     def model(self, variant: Int[Array, ""]) -> mjx.Model:
         """The variant's model."""
-        leaves = list(self.shared)
-        for index, stacked in self.varying.items():
-            leaves[index] = stacked[variant]
+        leaves = list(self.leaves)
+        for k in self.varying:
+            leaves[k] = leaves[k][variant]
         return jax.tree_util.tree_unflatten(self.structure, leaves)
 
 
@@ -46,15 +46,18 @@ def make_family(models: Sequence[mjx.Model]) -> Family:
                 "several kinds of object or support on engine 'native'"
             )
     rows = [jax.tree_util.tree_leaves(m) for m in models]
-    varying = {
-        k: jnp.stack([row[k] for row in rows])
+    varying = tuple(
+        k
         for k in range(len(rows[0]))
         if any(not np.array_equal(np.asarray(row[k]), np.asarray(rows[0][k])) for row in rows[1:])
-    }
-    return Family(structure=structures[0], shared=tuple(rows[0]), varying=varying)
+    )
+    leaves = tuple(
+        jnp.stack([row[k] for row in rows]) if k in varying else jnp.asarray(leaf) for k, leaf in enumerate(rows[0])
+    )
+    return Family(structure=structures[0], varying=varying, leaves=leaves)
 
 
 def leaf_names(model: mjx.Model) -> list[str]:
-    """The dotted name of each leaf, in the order of `Family.shared`."""
+    """The dotted name of each leaf, in the order of `Family.leaves`."""
     paths = jax.tree_util.tree_flatten_with_path(model)[0]
     return [".".join(str(getattr(key, "name", key)) for key in path) for path, _ in paths]

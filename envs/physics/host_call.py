@@ -1,8 +1,10 @@
 """NumPy functions called from compiled JAX functions that stay the same from process to process.
 
 `jax.pure_callback` bakes a pointer into what is compiled, so that JAX keeps no compilation that holds one, and every
-start compiles anew. Here the compiled function calls one handler by its name and tells it a number, as XLA's foreign
-function interface provides for (`xla/ffi/api/c_api.h`, which jaxlib ships and whose layout the structures below have).
+start compiles anew. Here the compiled function calls one handler by its name and gives it a number that says which
+function is meant, as XLA's foreign function interface provides for (`xla/ffi/api/c_api.h`, which jaxlib ships and whose
+layout the structures below have). The number is an array like any other: what was compiled with one function calls
+another when it is given another number.
 """
 
 import ctypes
@@ -11,8 +13,9 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, Int
 
 _TARGET = "mjx_hand_host_call"
 _API_VERSION = (0, 3)  # of the interface that the structures below are written for
@@ -34,19 +37,39 @@ class HostFunction:
     Args:
         function: from arrays to a tuple of arrays; `jax.vmap` gives it all arguments with the same leading axes. It
             must not call JAX, and must not keep the arrays, whose memory is XLA's.
+
+    Attributes:
+        number: what `call_host` knows it by.
     """
 
     def __init__(self, function: Callable[..., Sequence[np.ndarray]]):
-        self.function = function
-        self._number = next(_numbers)
-        _functions[self._number] = function
+        self.number = next(_numbers)
+        _functions[self.number] = function
 
     def __call__(self, shapes: tuple[jax.ShapeDtypeStruct, ...], *args: Array) -> tuple[Array, ...]:
         """Call it within a JAX function; `shapes` are those of the results without batch axes."""
-        if jax.default_backend() != "cpu":  # whose arrays JAX itself must bring to the host
-            return jax.pure_callback(self.function, shapes, *args, vmap_method="broadcast_all")
-        call = jax.ffi.ffi_call(_TARGET, shapes, vmap_method="broadcast_all")
-        return tuple(call(*args, number=np.int64(self._number)))
+        return call_host(jnp.asarray(self.number, jnp.int32), shapes, *args)
+
+
+def call_host(number: Int[Array, ""], shapes: tuple[jax.ShapeDtypeStruct, ...], *args: Array) -> tuple[Array, ...]:
+    """Call the `HostFunction` of this number within a JAX function.
+
+    Args:
+        number: of the function; the same for all elements of a batch.
+        shapes: of the results without batch axes.
+        args: what it is given.
+    """
+    if jax.default_backend() != "cpu":  # whose arrays JAX itself must bring to the host
+        return jax.pure_callback(_dispatch, shapes, number, *args, vmap_method="broadcast_all")
+    return tuple(jax.ffi.ffi_call(_TARGET, shapes, vmap_method="broadcast_all")(number, *args))
+
+
+def _dispatch(number: Any, *args: Any) -> Sequence[np.ndarray]:
+    """What the function of this number, which each element of a batch tells anew, makes of the arrays."""
+    numbers = np.unique(number)
+    if len(numbers) != 1:
+        raise ValueError(f"one call is for one host function, not for {len(numbers)} of them")
+    return _functions[int(numbers[0])](*args)
 
 
 class _Buffer(ctypes.Structure):
@@ -67,21 +90,6 @@ class _Buffers(ctypes.Structure):
         ("size", ctypes.c_int64),
         ("types", ctypes.c_void_p),
         ("items", ctypes.POINTER(ctypes.POINTER(_Buffer))),
-    )
-
-
-class _Scalar(ctypes.Structure):
-    _fields_ = (("dtype", ctypes.c_int), ("value", ctypes.POINTER(ctypes.c_int64)))
-
-
-class _Attributes(ctypes.Structure):
-    _fields_ = (
-        ("struct_size", ctypes.c_size_t),
-        ("extension", ctypes.c_void_p),
-        ("size", ctypes.c_int64),
-        ("types", ctypes.c_void_p),
-        ("names", ctypes.c_void_p),
-        ("items", ctypes.POINTER(ctypes.POINTER(_Scalar))),
     )
 
 
@@ -134,8 +142,7 @@ class _Call(ctypes.Structure):
         ("context", ctypes.c_void_p),
         ("stage", ctypes.c_int),
         ("arguments", _Buffers),
-        ("results", _Buffers),
-        ("attributes", _Attributes),
+        ("results", _Buffers),  # and attributes, of which these calls have none
     )
 
 
@@ -163,8 +170,7 @@ def _handler(pointer: Any) -> int | None:
         version.major, version.minor = _API_VERSION
         return None
     try:
-        number = call.attributes.items[0].contents.value[0]
-        results = _functions[number](*_arrays(call.arguments))
+        results = _dispatch(*_arrays(call.arguments))
         for space, result in zip(_arrays(call.results), results, strict=True):
             if space.shape != result.shape or space.dtype != result.dtype:
                 raise TypeError(f"expected {space.dtype}{space.shape}, got {result.dtype}{result.shape}")

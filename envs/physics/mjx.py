@@ -1,6 +1,9 @@
 """The `mjx` engine: MuJoCo's physics in JAX, on any accelerator."""
 
+import copy
+import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import jax
 import mujoco
@@ -35,6 +38,15 @@ class MjxEngine:
         self._family = make_family([_put(model, self.models[0]) for model in self.models])
         self._blank = mjx.make_data(self.models[0], impl="jax")
 
+    @property
+    def tables(self) -> Any:
+        return self._family.leaves
+
+    def with_tables(self, tables: Any) -> "MjxEngine":
+        other = copy.copy(self)
+        other._family = dataclasses.replace(self._family, leaves=tables)
+        return other
+
     def reset(
         self, variant: Int[Array, ""], qpos: Float[Array, "nq"], qvel: Float[Array, "nv"], ctrl: Float[Array, "nu"]
     ) -> PhysicsState:
@@ -47,9 +59,9 @@ class MjxEngine:
         return self._state(state.variant, data)
 
     def _state(self, variant: Int[Array, ""], data: mjx.Data) -> PhysicsState:
-        qpos, qvel, warmstart, unstable = recovered(self.models[0], data.qpos, data.qvel, data.qacc_warmstart)
-        # MJX leaves positions that derive from the state a substep behind it.
         model = self._family.model(variant)
+        qpos, qvel, warmstart, unstable = recovered(model.qpos0, data.qpos, data.qvel, data.qacc_warmstart)
+        # MJX leaves positions that derive from the state a substep behind it.
         data = mjx.kinematics(model, data.replace(qpos=qpos, qvel=qvel))
         data = mjx.sensor_pos(model, mjx.com_pos(model, data))
         return PhysicsState(

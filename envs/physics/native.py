@@ -2,9 +2,10 @@
 
 The simulation state crosses into JAX bit-cast from float64 to pairs of uint32, so that stepping is a pure and exact
 function of what JAX holds: it survives scans, `where` and checkpoints without rounding. Only NumPy runs in the
-callback.
+callback. The models stay on the host; the engine's tables are the numbers of the functions that step them.
 """
 
+import copy
 import os
 import threading
 from collections.abc import Sequence
@@ -18,7 +19,7 @@ from jaxtyping import Array, Float, Int
 from mujoco import batch
 
 from envs.physics.engine import PhysicsState
-from envs.physics.host_call import HostFunction
+from envs.physics.host_call import HostFunction, call_host
 from envs.physics.solver import gauss_seidel
 
 # Fields of the integration state that one step hands to the next, in its order and at the front of its rows; what comes
@@ -70,15 +71,20 @@ class NativeEngine:
             jax.ShapeDtypeStruct((model.nsensordata,), jnp.float32),
             jax.ShapeDtypeStruct((), jnp.float32),
         )
-        self._reset, self._step = HostFunction(self._host_reset), HostFunction(self._host_step)
+        self.tables = jnp.array([HostFunction(f).number for f in (self._host_reset, self._host_step)], jnp.int32)
+
+    def with_tables(self, tables: Any) -> "NativeEngine":
+        other = copy.copy(self)
+        other.tables = tables
+        return other
 
     def reset(
         self, variant: Int[Array, ""], qpos: Float[Array, "nq"], qvel: Float[Array, "nv"], ctrl: Float[Array, "nu"]
     ) -> PhysicsState:
-        return self._state(variant, self._reset(self._shapes, variant, qpos, qvel))
+        return self._state(variant, call_host(self.tables[0], self._shapes, variant, qpos, qvel))
 
     def step(self, state: PhysicsState, ctrl: Float[Array, "nu"]) -> PhysicsState:
-        return self._state(state.variant, self._step(self._shapes, state.variant, state.memory, ctrl))
+        return self._state(state.variant, call_host(self.tables[1], self._shapes, state.variant, state.memory, ctrl))
 
     def _state(self, variant: Int[Array, ""], out: tuple[Array, ...]) -> PhysicsState:
         memory, qpos, qvel, sensordata, unstable = out

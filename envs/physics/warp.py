@@ -3,7 +3,10 @@
 Kernels are built on first use, in about a minute, and kept in Warp's own cache.
 """
 
+import copy
+import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -50,8 +53,15 @@ class WarpEngine:
         _check_variable(self._family, models[0])
         self._sites = _sensor_sites(self.models[0])
         self._capacity = _capacity(self.models[0])
-        self._step_worlds = _flattening(self._advance)
-        self._look_worlds = _flattening(self._look)
+
+    @property
+    def tables(self) -> Any:
+        return self._family.leaves
+
+    def with_tables(self, tables: Any) -> "WarpEngine":
+        other = copy.copy(self)
+        other._family = dataclasses.replace(self._family, leaves=tables)
+        return other
 
     def reset(
         self, variant: Int[Array, ""], qpos: Float[Array, "nq"], qvel: Float[Array, "nv"], ctrl: Float[Array, "nu"]
@@ -60,14 +70,15 @@ class WarpEngine:
 
     def step(self, state: PhysicsState, ctrl: Float[Array, "nu"]) -> PhysicsState:
         worlds = (state.variant, state.qpos, state.qvel, state.memory, ctrl)
-        qpos, qvel, warmstart = _only(self._step_worlds(*(leaf[None] for leaf in worlds)))
+        qpos, qvel, warmstart = _only(_flattening(self._advance)(*(leaf[None] for leaf in worlds)))
         # Warp clamps a control that is no number to its range, unnoticed.
         qpos = jnp.where(jnp.isfinite(ctrl).all(), qpos, jnp.nan)
         return self._state(state.variant, qpos, qvel, warmstart)
 
     def _state(self, variant: Array, qpos: Array, qvel: Array, warmstart: Array) -> PhysicsState:
-        qpos, qvel, warmstart, unstable = recovered(self.models[0], qpos, qvel, warmstart)
-        (sensordata,) = _only(self._look_worlds(variant[None], qpos[None]))
+        rest = self._family.model(variant).qpos0
+        qpos, qvel, warmstart, unstable = recovered(rest, qpos, qvel, warmstart)
+        (sensordata,) = _only(_flattening(self._look)(variant[None], qpos[None]))
         return PhysicsState(
             variant=variant, qpos=qpos, qvel=qvel, sensordata=sensordata, memory=warmstart, unstable=unstable
         )

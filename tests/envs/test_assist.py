@@ -44,14 +44,14 @@ def displaced(env, demonstration, turn, move):
 
 
 @pytest.mark.parametrize("progress", [0.0, 0.5, 1.0])
-def test_it_pulls_and_turns_the_object_to_its_reference(assisted, monkeypatch, progress):
+def test_it_pulls_and_turns_the_object_to_its_reference(assisted, progress):
     """From rest, and held for one control step: speed = stiffness x error x time, whatever the mass; and gravity."""
     move, turn = np.array([0.01, -0.02, 0.03]), np.array([0.1, 0.2, -0.1])
     for demonstration in range(2):
         state, poses, turned = displaced(assisted, demonstration, turn, move)
-        monkeypatch.setattr(assisted, "reference", replace(assisted.reference, object_pose=poses))
+        moved = replace(assisted.tables, reference=replace(assisted.reference, object_pose=poses))
         state = state.replace(info={**state.info, "progress": jnp.asarray(progress)})
-        speed = np.asarray(assisted.step(state, jnp.zeros(26)).pipeline_state.physics.qvel[26:])
+        speed = np.asarray(assisted.with_tables(moved).step(state, jnp.zeros(26)).pipeline_state.physics.qvel[26:])
         pull = STIFFNESS * (1 - progress) * assisted.dt
         np.testing.assert_allclose(speed[:3], [*(-pull * move[:2]), -pull * move[2] - 9.81 * assisted.dt], atol=2e-4)
         np.testing.assert_allclose(speed[3:], turned.inv().apply(-pull * turn), atol=2e-3)
@@ -102,10 +102,9 @@ def test_termination_tightens(env):
     pose = env.reference.object_pose.at[..., 0].add(0.05)
     done = []
     for progress in (0.0, 1.0):
-        moved = replace(env.reference, object_pose=pose)
+        moved = env.with_tables(replace(env.tables, reference=replace(env.reference, object_pose=pose)))
         with pytest.MonkeyPatch.context() as patched:
-            patched.setattr(env, "task", tight)
-            patched.setattr(env, "reference", moved)
+            patched.setattr(moved, "task", tight)
             info = {**state.info, "progress": jnp.asarray(progress)}
-            done.append(float(env.step(state.replace(info=info), jnp.zeros(26)).done))
+            done.append(float(moved.step(state.replace(info=info), jnp.zeros(26)).done))
     assert done == [0, 1]

@@ -48,7 +48,7 @@ def test_spare_boxes_change_nothing(mixed, hands, env, lifted):
     for spare in (0, 3):
         model = demonstration_model(mixed[0], hands[0], spare=spare)
         data = mujoco.MjData(model)
-        data.qpos[:] = np.asarray(env._starts.qpos[0, frame])
+        data.qpos[:] = np.asarray(env.tables.starts.qpos[0, frame])
         for k in range(10):
             data.ctrl[:] = np.asarray(env.reference.controls[0, frame + k])
             mujoco.mj_step(model, data, nstep=5)

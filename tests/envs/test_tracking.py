@@ -126,7 +126,7 @@ def test_a_reset_only_looks_up(env):
     assert "callback" not in text
     state = jax.jit(env.reset)(jax.random.key(0))
     twin = state.pipeline_state
-    table = jax.tree.map(lambda leaf: leaf[twin.demonstration, twin.frame], env._starts)
+    table = jax.tree.map(lambda leaf: leaf[twin.demonstration, twin.frame], env.tables.starts)
     jax.tree.map(np.testing.assert_array_equal, twin.physics, table)
 
 

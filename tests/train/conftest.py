@@ -61,7 +61,8 @@ def compiled_once() -> Iterator[None]:
             learners[key] = Learner(parallel, ppo)  # which keeps the environment alive, and its id its own
         return learners[key]
 
-    def roll_out(env: TrackingEnv, hands: Any, policy: Any) -> Any:
+    def roll_out(env: TrackingEnv, hands: Any, policy: Any, repeats: int) -> Any:
+        assert repeats == 1, "on a CPU"
         if id(env) not in rollers:
             rollers[id(env)] = make_roll_out(env, hands, policy)
         return rollers[id(env)]

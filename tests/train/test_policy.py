@@ -3,8 +3,9 @@ import numpy as np
 import pytest
 from brax.training.agents.ppo import networks
 
+from mjx_hand.errors import InputError
 from train.options import Ppo
-from train.policy import deterministic_policy, network_factory
+from train.policy import _check_flax, deterministic_policy, network_factory
 
 PPO = Ppo(policy_layers=(12, 8), value_layers=(6,), initial_std=0.3)
 OBSERVATIONS, ACTIONS = 9, 26
@@ -60,3 +61,20 @@ def test_noise_starts_at_the_configured_size_whatever_the_state(made, parameters
     mean = deterministic_policy(PPO, OBSERVATIONS, ACTIONS)(parameters, observation[:2])
     np.testing.assert_allclose(drawn.mean(axis=1), mean, atol=0.03)
     np.testing.assert_allclose(drawn.std(axis=1), 0.3, rtol=0.1)
+
+
+@pytest.mark.parametrize(
+    ("jax_version", "flax_version", "runs"),
+    [
+        ((0, 10, 2), "0.12.6", True),
+        ((0, 11, 2), "0.12.6", False),
+        ((0, 12, 0), "0.12.12", True),
+        ((0, 11, 0), "0.13.0", True),
+    ],
+)
+def test_a_flax_that_jax_has_outgrown_is_named(jax_version, flax_version, runs):
+    if runs:
+        _check_flax(jax_version, flax_version)
+    else:
+        with pytest.raises(InputError, match=r"flax 0.12.6 does not run on jax 0.11.2.* pip install --upgrade flax"):
+            _check_flax(jax_version, flax_version)

@@ -31,7 +31,7 @@ def rollout_inputs(env, lifted):
     """Eight worlds, two hands: half in the air before the grasp, half pinching; replayed with a little noise."""
     frames = np.concatenate([[2, 10], lifted[0][[0, 20]], [2, 10], lifted[1][[0, 20]]])
     demos = np.repeat([0, 1], 4)
-    start = jax.tree.map(lambda leaf: np.asarray(leaf)[demos, frames], env._starts)
+    start = jax.tree.map(lambda leaf: np.asarray(leaf)[demos, frames], env.tables.starts)
     last = np.asarray(env.reference.length)[demos] - 1
     controls = [np.asarray(env.reference.controls)[demos, np.minimum(frames + 1 + k, last)] for k in range(STEPS)]
     noise = np.random.default_rng(0).normal(scale=0.002, size=(STEPS, 8, NUM_WRIST + NUM_HINGES))
@@ -238,7 +238,7 @@ def test_warp_drops_objects_of_other_masses_and_sizes_as_mujoco_does(env, demons
     big = replace(d, object=replace(d.object, size=d.object.size * 1.5, mass=d.object.mass * 4))
     models = [demonstration_model(d, hands[0]), demonstration_model(big, hands[0])]
     engine = make_engine("warp", models, SUBSTEPS)
-    q = np.stack([np.asarray(env._starts.qpos[0, 0])] * 2)
+    q = np.stack([np.asarray(env.tables.starts.qpos[0, 0])] * 2)
     q[:, THING.stop - 1] += 0.03
     controls = np.broadcast_to(q[:, : THING.start], (25, 2, THING.start)).astype(np.float32)
     worlds = (jnp.array([0, 1], jnp.int32), jnp.asarray(q), jnp.zeros((2, models[0].nv)), jnp.asarray(controls))
