@@ -40,8 +40,8 @@ def _check_flax(jax_version: tuple[int, ...], flax_version: str) -> None:
     """Flax names no upper bound of JAX, so that an installer keeps an old one beside a new JAX."""
     if jax_version >= (0, 11) and tuple(int(part) for part in flax_version.split(".")[:3]) < (0, 12, 12):
         raise InputError(
-            f"flax {flax_version} does not run on jax {'.'.join(map(str, jax_version))}, which needs flax 0.12.12 or newer; "
-            "install it with: pip install --upgrade flax"
+            f"flax {flax_version} does not run on jax {'.'.join(map(str, jax_version))}, which needs flax 0.12.12 or "
+            "newer; install it with: pip install --upgrade flax"
         )
 
 
