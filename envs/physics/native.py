@@ -156,9 +156,13 @@ class NativeEngine:
         moving = [carried[:, self._slices[field]] for field in ("qpos", "qvel")]
         fields = [field.astype(np.float32) for field in (*moving, placed.bind("sensordata"))]
         bits = carried.view(np.uint32)
-        return (bits.reshape(*lead, -1), *(f.reshape(*lead, -1) for f in fields), np.float32(unstable).reshape(lead))
+        return (
+            bits.reshape(*lead, -1),
+            *(f.reshape(*lead, -1) for f in fields),
+            unstable.astype(np.float32).reshape(lead),
+        )
 
 
 def _diverged(worlds: batch.Batch) -> np.ndarray:
     """Which worlds the engine found a bad number in."""
-    return (worlds.warning[:, DIVERGED, 1] > 0).any(axis=1)
+    return worlds.warning[:, DIVERGED, 1].any(axis=1)

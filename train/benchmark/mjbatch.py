@@ -140,7 +140,8 @@ def _rounds(entered: Sequence[Entrant], rounds: int, seconds: float, report: Cal
     passes = [_enough_passes(entrant, seconds) for entrant in entered]
     spent = np.zeros((len(entered), rounds, 2))
     for k in range(rounds):
-        for i in np.roll(np.arange(len(entered)), k):  # who goes first changes, too
+        for turn in range(len(entered)):
+            i = (turn + k) % len(entered)  # who goes first changes, too
             spent[i, k] = np.divide(entered[i].run(passes[i]), passes[i])
         report(1)
     return spent

@@ -59,10 +59,10 @@ class Row:
         rows = []
         for name, rate, end in zip(names, rates, ends, strict=True):
             off = np.linalg.norm(np.float32(end[:, _POSITION]) - np.float32(ends[0][:, _POSITION]), axis=-1)
-            figures = [*rate.T, *(rates[0] / rate).T]
-            rows.append(
-                cls(setting, name, worlds, *(Rate.of(f) for f in figures), (float(np.median(off)), float(off.max())))
-            )
+            steps, steps_of_cpu = (Rate.of(each) for each in rate.T.tolist())
+            native, native_of_cpu = (Rate.of(each) for each in (rates[0] / rate).T.tolist())
+            apart = (float(np.median(off)), float(off.max()))
+            rows.append(cls(setting, name, worlds, steps, steps_of_cpu, native, native_of_cpu, apart))
         return rows
 
 

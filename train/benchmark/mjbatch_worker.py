@@ -9,9 +9,11 @@ line each. It says at once which versions it has; then it is told to
 - say where a pass `end`s.
 """
 
+import importlib
 import json
 import sys
 import time
+from importlib.metadata import version
 
 import mujoco
 import numpy as np
@@ -61,8 +63,7 @@ class Worlds:
     """
 
     def __init__(self, scene, numbers, script, threads, forward):
-        import mjbatch  # here, so that what reads models is tested without it
-
+        mjbatch = importlib.import_module("mjbatch")  # here, so that what reads models is tested without it
         with np.load(numbers) as numbers, np.load(script) as script:
             model, varying, *self.odd = load_model(scene, dict(numbers))
             self.batch = mjbatch.Batch(model, num_sims=len(script["variant"]), num_threads=threads, forward=forward)
@@ -93,8 +94,6 @@ class Worlds:
 
 def main():
     """Serve requests until the input ends."""
-    from importlib.metadata import version
-
     made = {}
     print(json.dumps({"mjbatch": version("mjbatch"), "mujoco": version("mujoco")}), flush=True)
     for line in sys.stdin:
