@@ -32,7 +32,7 @@ _GEOM = {
 }
 
 
-def scene_model(
+def scene_spec(
     rigid: RigidHand,
     thing: ObjectDescription,
     support: Float[np.ndarray, "b 3"],
@@ -43,8 +43,8 @@ def scene_model(
     visual: bool = False,
     spare: int = 0,
     assisted: bool = False,
-) -> mujoco.MjModel:
-    """Compile the scene. qpos is the wrist's 3 slides (m) and 3 turns (rad), the 20 hinges, the object's free joint.
+) -> mujoco.MjSpec:
+    """The scene. Compiled, its qpos is the wrist's 3 slides (m) and 3 turns (rad), 20 hinges, the object's free joint.
 
     Args:
         rigid: the hand.
@@ -89,7 +89,33 @@ def scene_model(
     # MJX alone reads these: it works every possible contact out, and is a tenth as quick without a cap.
     for name, most in MJX_CAPS.items():
         spec.add_numeric(name=name, data=[most])
-    return spec.compile()
+    return spec
+
+
+def scene_model(
+    rigid: RigidHand,
+    thing: ObjectDescription,
+    support: Float[np.ndarray, "b 3"],
+    support_position: Float[np.ndarray, "b 3"],
+    base_rotation: Float[np.ndarray, "3 3"],
+    *,
+    gains: Gains | None = None,
+    visual: bool = False,
+    spare: int = 0,
+    assisted: bool = False,
+) -> mujoco.MjModel:
+    """Compile the scene; arguments as of `scene_spec`."""
+    return scene_spec(
+        rigid,
+        thing,
+        support,
+        support_position,
+        base_rotation,
+        gains=gains,
+        visual=visual,
+        spare=spare,
+        assisted=assisted,
+    ).compile()
 
 
 def _object_geoms(spec: mujoco.MjSpec, body: mujoco.MjsBody, thing: ObjectDescription) -> list[mujoco.MjsGeom]:

@@ -9,7 +9,7 @@ import copy
 import os
 import threading
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -37,6 +37,19 @@ DIVERGED = [
 ]
 
 
+class _Worlds(NamedTuple):
+    """Worlds as two batches.
+
+    Attributes:
+        moving: steps them.
+        placed: the same without contacts. It says where everything is after a step, which contacts do not change and
+            take most of the time to find.
+    """
+
+    moving: batch.Batch
+    placed: batch.Batch
+
+
 def make(models: Sequence[mujoco.MjModel], substeps: int) -> "NativeEngine":
     """The engine over copies of the models with its own solver settings."""
     return NativeEngine(gauss_seidel(models), substeps)
@@ -55,9 +68,12 @@ class NativeEngine:
     def __init__(self, models: Sequence[mujoco.MjModel], substeps: int, threads: int | None = None):
         self.models = list(models)
         self.substeps = substeps
+        self._placed = [copy.copy(model) for model in self.models]
+        for model in self._placed:
+            model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
         self._threads = threads or cores()
-        self._batches: dict[int, batch.Batch] = {}
-        self._running: dict[int, np.ndarray] = {}  # the variants that each cached batch is set to
+        self._worlds: dict[int, _Worlds] = {}
+        self._running: dict[int, np.ndarray] = {}  # the variants that each cached pair is set to
         self._lock = threading.Lock()
         model = self.models[0]
         sizes = {"time": 1, "qpos": model.nq, "qvel": model.nv, "act": model.na, "qacc_warmstart": model.nv}
@@ -99,41 +115,59 @@ class NativeEngine:
         carried[:, self._slices["qpos"]] = qpos.reshape(variant.size, -1)
         carried[:, self._slices["qvel"]] = qvel.reshape(variant.size, -1)
         with self._lock:
-            worlds = self._load(variant.reshape(-1), carried)
-            worlds.forward(stage=mujoco.mjtStage.mjSTAGE_POS)
-            return self._unload(worlds, lead)
+            _, placed = self._load(variant.reshape(-1))
+            unstable = self._place(placed, carried)
+            return self._unload(placed, unstable, lead)
 
     def _host_step(self, variant: Any, memory: Any, ctrl: Any) -> tuple[np.ndarray, ...]:
         variant, memory, ctrl = np.asarray(variant), np.asarray(memory), np.asarray(ctrl)
         lead = variant.shape
         carried = np.ascontiguousarray(memory.reshape(variant.size, -1)).view(np.float64)
         with self._lock:
-            worlds = self._load(variant.reshape(-1), carried)
-            worlds.bind("ctrl")[:] = ctrl.reshape(variant.size, -1)
-            # POS: without it positions derived from the state, sensors among them, lag one substep behind it.
-            worlds.step(nstep=self.substeps, stage=mujoco.mjtStage.mjSTAGE_POS)
-            return self._unload(worlds, lead)
+            moving, placed = self._load(variant.reshape(-1))
+            moving.state[:, : self._size] = carried
+            moving.state[:, self._size : self._size + ctrl.shape[-1]] = ctrl.reshape(variant.size, -1)
+            moving.warning[...] = 0
+            moving.step(nstep=self.substeps)
+            # Without it positions derived from the state, sensors among them, lag one substep behind it.
+            unstable = self._place(placed, moving.state[:, : self._size]) | _diverged(moving)
+            return self._unload(placed, unstable, lead)
 
-    def _load(self, variant: np.ndarray, carried: np.ndarray) -> batch.Batch:
-        """A batch of this size whose worlds run the given variants from the given states."""
+    def _load(self, variant: np.ndarray) -> _Worlds:
+        """Worlds of this number that run the given variants."""
         count = variant.size
-        if count not in self._batches:
-            made = batch.Batch(self.models[0], nsim=count, nthread=min(self._threads, count))
-            made.bind("sensordata")
-            self._batches[count] = made
+        if count not in self._worlds:
+            threads = min(self._threads, count)
+            made = _Worlds(*(batch.Batch(m[0], nsim=count, nthread=threads) for m in (self.models, self._placed)))
+            made.placed.bind("sensordata")
+            self._worlds[count] = made
             self._running[count] = np.full(count, -1)
-        worlds = self._batches[count]
+        worlds = self._worlds[count]
         if not np.array_equal(self._running[count], variant):
-            worlds.set_models([self.models[v] for v in variant])
+            worlds.moving.set_models([self.models[v] for v in variant])
+            worlds.placed.set_models([self._placed[v] for v in variant])
             self._running[count] = variant.copy()
-        worlds.state[:, : self._size] = carried
-        worlds.warning[...] = 0
         return worlds
 
-    def _unload(self, worlds: batch.Batch, lead: tuple[int, ...]) -> tuple[np.ndarray, ...]:
-        carried = worlds.state[:, : self._size].copy()
+    def _place(self, placed: batch.Batch, carried: np.ndarray) -> np.ndarray:
+        """Work out where everything is in these states; which worlds had a bad number, and were reset for it."""
+        placed.state[:, : self._size] = carried
+        placed.warning[...] = 0
+        placed.forward(stage=mujoco.mjtStage.mjSTAGE_POS)
+        return _diverged(placed)
+
+    def _unload(self, placed: batch.Batch, unstable: np.ndarray, lead: tuple[int, ...]) -> tuple[np.ndarray, ...]:
+        carried = placed.state[:, : self._size].copy()
         moving = [carried[:, self._slices[field]] for field in ("qpos", "qvel")]
-        fields = [field.astype(np.float32) for field in (*moving, worlds.bind("sensordata"))]
-        unstable = (worlds.warning[:, DIVERGED, 1] > 0).any(axis=1).astype(np.float32)
+        fields = [field.astype(np.float32) for field in (*moving, placed.bind("sensordata"))]
         bits = carried.view(np.uint32)
-        return (bits.reshape(*lead, -1), *(f.reshape(*lead, -1) for f in fields), unstable.reshape(lead))
+        return (
+            bits.reshape(*lead, -1),
+            *(f.reshape(*lead, -1) for f in fields),
+            unstable.astype(np.float32).reshape(lead),
+        )
+
+
+def _diverged(worlds: batch.Batch) -> np.ndarray:
+    """Which worlds the engine found a bad number in."""
+    return worlds.warning[:, DIVERGED, 1].any(axis=1)

@@ -8,12 +8,13 @@ import tyro
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 from mjx_hand.motion.archive import replacing
-from train.benchmark import convergence, engines, keypoints, retarget, solver
+from train.benchmark import convergence, engines, keypoints, mjbatch, retarget, solver
 
 MODULES = {
     "convergence": convergence,
     "engines": engines,
     "keypoints": keypoints,
+    "mjbatch": mjbatch,
     "retarget": retarget,
     "solver": solver,
 }
