@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from envs.physics.host_call import HostFunction
+from envs.physics.host_call import HostFunction, call_host
 
 ROOT = Path(__file__).resolve().parent.parent.parent.parent
 THREE = jax.ShapeDtypeStruct((3,), jnp.float32)
@@ -67,6 +67,28 @@ def test_what_goes_wrong_is_told():
         jax.block_until_ready(jax.jit(calling(refuse, THREE))(jnp.ones(3)))
     with pytest.raises(jax.errors.JaxRuntimeError, match=r"expected float32\(3,\), got float64\(3,\)"):
         jax.block_until_ready(jax.jit(calling(lambda a: (a.astype(float),), THREE))(jnp.ones(3)))
+
+
+def test_what_was_compiled_with_one_function_calls_another_by_its_number():
+    double, negate = HostFunction(lambda a: (2 * a,)), HostFunction(lambda a: (-a,))
+    call = jax.jit(jax.vmap(lambda number, a: call_host(number, (THREE,), a)[0], in_axes=(None, 0)))
+    a = jnp.arange(6.0).reshape(2, 3)
+    np.testing.assert_array_equal(call(jnp.int32(double.number), a), 2 * a)
+    np.testing.assert_array_equal(call(jnp.int32(negate.number), a), -a)
+    assert call._cache_size() == 1
+    each = jax.jit(jax.vmap(lambda number, a: call_host(number, (THREE,), a)[0]))
+    with pytest.raises(jax.errors.JaxRuntimeError, match="these elements of a batch name several"):
+        jax.block_until_ready(each(jnp.array([double.number, negate.number]), a))
+
+
+def test_where_arrays_live_on_an_accelerator_jax_brings_them_to_the_host(monkeypatch: pytest.MonkeyPatch):
+    """The same results by JAX's own way, as native physics beside a learner on a GPU has it."""
+    call = calling(affine, THREE, jax.ShapeDtypeStruct((3,), jnp.int32))
+    a, b = np.random.default_rng(0).normal(size=(2, 4, 5, 3)).astype(np.float32)
+    monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
+    double, greater = jax.jit(jax.vmap(jax.vmap(call)))(jnp.asarray(a), jnp.asarray(b))
+    np.testing.assert_array_equal(double, 2 * a + b)
+    np.testing.assert_array_equal(greater, a > b)
 
 
 def test_it_outlives_all_that_held_it():
