@@ -51,8 +51,10 @@ class Engine(Protocol):
     """
 
     name: str
-    models: Sequence[mujoco.MjModel]
     substeps: int
+
+    @property
+    def models(self) -> Sequence[mujoco.MjModel]: ...
 
     def reset(
         self,
