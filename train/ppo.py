@@ -7,7 +7,7 @@ its last state when the same command is given again, and ends as it would have e
 
 import dataclasses
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,7 @@ from train.sweep import sweepable_command
 from train.unstable import UnstableLog
 
 _LOG_SECONDS = 2.0  # between two lines of training metrics
+Watch = Callable[[Sequence["Point"], float], bool]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,12 +48,14 @@ class Point:
     rotation_error_deg: float
 
 
-def train(config: Config, world: World | None = None) -> list[Point]:
+def train(config: Config, world: World | None = None, watch: Watch | None = None) -> list[Point]:
     """Train, or go on, and return the evaluations, the first before any learning.
 
     Args:
         config: the experiment.
         world: its training part, where the caller has made it already.
+        watch: told after each update of the evaluations so far, and of the seconds that those made here took together;
+            where it says True the training ends there, its state saved.
 
     Raises:
         InputError: an `out` folder that cannot be written, holds another training or has one under way, or whatever
@@ -60,10 +63,10 @@ def train(config: Config, world: World | None = None) -> list[Point]:
         SystemExit: it was interrupted (status 128 and the signal's number); its state is saved.
     """
     with run_folder(config) as folder:
-        return _train(config, world, folder)
+        return _train(config, world, folder, watch)
 
 
-def _train(config: Config, world: World | None, folder: RunFolder) -> list[Point]:
+def _train(config: Config, world: World | None, folder: RunFolder, watch: Watch | None) -> list[Point]:
     world = make_world(config, "train") if world is None else world
     learner = Learner(ParallelEnv(world.env, guard=config.debug.nan_guard), config.ppo)
     state, points, seconds = _start(config, learner, folder)
@@ -79,7 +82,7 @@ def _train(config: Config, world: World | None, folder: RunFolder) -> list[Point
     if seconds:
         print(f"going on from {run.steps:,} steps", flush=True)
     with interruptions() as asked:
-        stopped = run.until_finished(asked)
+        stopped = run.until_finished(asked, watch)
     if stopped:
         print(f"stopped at {run.steps:,} steps and saved; the same command goes on from there", flush=True)
         raise SystemExit(128 + stopped)
@@ -118,8 +121,8 @@ class _Run:
         self.last = config.ppo.budget
         self.repeats = rollouts_per_demonstration(world.env)
         self.between = updates_between(config.checks, config.ppo, world.env, self.repeats)
-        self.evaluating = 0.0  # s
         self.start = time.monotonic() - seconds
+        self.evaluating = 0.0  # seconds
         policy = deterministic_policy(config.ppo, world.env.observation_size, world.env.action_size)
         self.unstable = (
             UnstableLog(folder.path / "unstable", world.env, config.seed) if config.debug.nan_guard else None
@@ -137,8 +140,8 @@ class _Run:
         last = self.points[-1]
         return last.success >= self.config.checks.stop_at or (self.updates >= self.last and last.steps == self.steps)
 
-    def until_finished(self, asked: Callable[[], int]) -> int:
-        """Update, evaluate and save until all is done; the signal's number if one came before."""
+    def until_finished(self, asked: Callable[[], int], watch: Watch | None) -> int:
+        """Update, evaluate and save until all is done, or watched enough; the signal's number if one came before."""
         with (
             SummaryWriter(str(self.folder.path / "tensorboard"), write_to_disk=is_first()) as writer,
             counter(self.last * self.learner.steps_per_update, "training (steps)", self.steps) as advance,
@@ -170,6 +173,9 @@ class _Run:
                     self._check(writer, gathered(self.state.params), self.steps)
                 if due or self.finished:
                     self._save()
+                if watch is not None and watch(self.points, self.evaluating):
+                    self._save()
+                    break
         return 0
 
     def _log(self, writer: SummaryWriter, metrics: Any) -> None:

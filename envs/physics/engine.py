@@ -52,7 +52,6 @@ class Engine(Protocol):
     """
 
     name: str
-    models: Sequence[mujoco.MjModel]
     substeps: int
     tables: Any
 
@@ -62,6 +61,9 @@ class Engine(Protocol):
         A function compiled over `with_tables(argument)` steps any such family without compiling anew.
         """
         ...
+
+    @property
+    def models(self) -> Sequence[mujoco.MjModel]: ...
 
     def reset(
         self,

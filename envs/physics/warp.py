@@ -132,11 +132,15 @@ def _only(leaves: tuple[Array, ...]) -> tuple[Array, ...]:
     return tuple(leaf[0] for leaf in leaves)
 
 
-def _put(model: mujoco.MjModel, first: mujoco.MjModel) -> mjx.Model:
+def put_quietly(model: mujoco.MjModel) -> mjx.Model:
+    """The model for Warp, whose settings cap the iterations on purpose: no line for each world that reaches a cap."""
     put = mjx.put_model(model, impl="warp")
-    # The settings cap the iterations on purpose: no line of warning for each world that reaches a cap.
     heeded = put.opt._impl.warn_overflow & ~(OverflowType.ITERATIONS | OverflowType.LS_ITERATIONS)
-    put = put.replace(opt=put.opt.replace(_impl=put.opt._impl.replace(warn_overflow=int(heeded))))
+    return put.replace(opt=put.opt.replace(_impl=put.opt._impl.replace(warn_overflow=int(heeded))))
+
+
+def _put(model: mujoco.MjModel, first: mujoco.MjModel) -> mjx.Model:
+    put = put_quietly(model)
     # Compiled in, and different from hand to hand, but read for sleeping islands alone, which these scenes do not have.
     return put.replace(_impl=put._impl.replace(dof_length=np.array(first.dof_length, np.float32)))
 

@@ -1,4 +1,7 @@
-"""`python -m train.benchmark [NAME]`: what this machine does, by a module of `MODULES`; by all where none is named."""
+"""`python -m train.benchmark [NAME]`: what this machine does, by a module of `MODULES`.
+
+Where none is named, by all but those of `BY_NAME`.
+"""
 
 import sys
 from collections.abc import Sequence
@@ -9,15 +12,18 @@ from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 from mjx_hand.motion.archive import replacing
 from train.benchmark import convergence, engines, keypoints, mjbatch, retarget, solver
+from train.benchmark.gpu import command as gpu
 
 MODULES = {
     "convergence": convergence,
     "engines": engines,
+    "gpu": gpu,
     "keypoints": keypoints,
     "mjbatch": mjbatch,
     "retarget": retarget,
     "solver": solver,
 }
+BY_NAME = ("gpu",)  # needs what few machines have
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -33,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if argv:
             chosen = [tyro.extras.subcommand_cli_from_dict(options, prog="python -m train.benchmark", args=argv)]
         else:
-            chosen = [make() for make in options.values()]
+            chosen = [make() for name, make in options.items() if name not in BY_NAME]
         for choice in chosen:
             (module,) = (m for m in MODULES.values() if type(choice) is m.Options)
             text = "\n".join(module.report(choice)) + "\n"

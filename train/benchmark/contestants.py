@@ -105,7 +105,7 @@ def environment(env: TrackingEnv, worlds: int) -> Contestant:
 
         return jax.lax.fori_loop(0, steps, step, state)
 
-    run, seconds = _compiled(advance, state, jax.random.key(1), 1)
+    run, seconds = compiled(advance, state, jax.random.key(1), 1)
     key = jax.random.key(1)
 
     def onwards(steps: int) -> Float[jax.Array, "n q"]:
@@ -130,7 +130,7 @@ def physics(env: TrackingEnv, worlds: int) -> Contestant:
         return jax.lax.fori_loop(0, steps, step, start)
 
     controls = jnp.asarray(script.controls, jnp.float32)
-    run, seconds = _compiled(advance, start, controls, 1)
+    run, seconds = compiled(advance, start, controls, 1)
     return Contestant(
         env.engine.name,
         "physics",
@@ -190,7 +190,7 @@ def _full_states(env: TrackingEnv, script: Script) -> Float[np.ndarray, "n s"]:
     return states
 
 
-def _compiled(function: Callable[..., Any], *args: Any) -> tuple[Callable[..., Any], float]:
+def compiled(function: Callable[..., Any], *args: Any) -> tuple[Callable[..., Any], float]:
     """The compiled function, and how long compiling took without kept compilations."""
     with _compiling_anew():
         started = time.perf_counter()

@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from envs.agreement import LIMITS, STEPS, c_engine, departure, free_and_gripping, rolled
 from envs.physics import make_engine
 from envs.physics.engine import check_family, default_engine
 from envs.physics.mjx import MjxEngine
@@ -17,7 +18,7 @@ from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.pytree import replace
 
-SUBSTEPS, STEPS = 5, 6
+SUBSTEPS = 5
 THING = slice(NUM_WRIST + NUM_HINGES, NUM_WRIST + NUM_HINGES + 3)
 
 
@@ -27,40 +28,9 @@ def family(env):
 
 
 @pytest.fixture(scope="module")
-def rollout_inputs(env, lifted):
+def rollout_inputs(env):
     """Eight worlds, two hands: half in the air before the grasp, half pinching; replayed with a little noise."""
-    frames = np.concatenate([[2, 10], lifted[0][[0, 20]], [2, 10], lifted[1][[0, 20]]])
-    demos = np.repeat([0, 1], 4)
-    start = jax.tree.map(lambda leaf: np.asarray(leaf)[demos, frames], env.tables.starts)
-    last = np.asarray(env.reference.length)[demos] - 1
-    controls = [np.asarray(env.reference.controls)[demos, np.minimum(frames + 1 + k, last)] for k in range(STEPS)]
-    noise = np.random.default_rng(0).normal(scale=0.002, size=(STEPS, 8, NUM_WRIST + NUM_HINGES))
-    low, high = env.models[0].actuator_ctrlrange.T
-    controls = np.clip(np.stack(controls) + noise, low, high).astype(np.float32)
-    pinching = np.tile([False, False, True, True], 2)
-    return (
-        jnp.asarray(demos, jnp.int32),
-        jnp.asarray(start.qpos),
-        jnp.asarray(start.qvel),
-        jnp.asarray(controls),
-        pinching,
-    )
-
-
-def rolled(engine):
-    """A jitted function from (variants, qpos, qvel, controls of each step) to the states after each step."""
-
-    @jax.jit
-    def roll(variant, qpos, qvel, controls):
-        state = jax.vmap(engine.reset)(variant, qpos, qvel, controls[0])
-
-        def step(state, ctrl):
-            state = jax.vmap(engine.step)(state, ctrl)
-            return state, state
-
-        return jax.lax.scan(step, state, controls)[1]
-
-    return roll
+    return free_and_gripping(env)
 
 
 @pytest.fixture(scope="module")
@@ -131,22 +101,6 @@ def test_the_start_of_a_native_world_is_what_was_asked_for(family, rollout_input
     assert not np.asarray(state.unstable).any()
 
 
-def assert_agrees(found, wanted, pinching, free, touching):
-    """How far (m) the object and tips are from where C MuJoCo has them: `free` where nothing is gripped."""
-    distance = np.linalg.norm(np.asarray(found.qpos - wanted.qpos)[..., THING], axis=-1).max(axis=0)
-    tips = np.abs(np.asarray(found.sensordata - wanted.sensordata)).max(axis=(0, 2))
-    assert not np.asarray(found.unstable).any()
-    assert distance[~pinching].max() < free
-    assert tips[~pinching].max() < free
-    for share, limit in touching.items():
-        assert np.quantile(distance[pinching], share) < limit
-
-
-def own_settings(engine):
-    """C MuJoCo on another engine's models, solver settings included."""
-    return NativeEngine(engine.models, SUBSTEPS)
-
-
 @pytest.fixture(scope="module")
 def mjx_engine(env):
     engine = make_engine("mjx", env.models, SUBSTEPS)
@@ -161,17 +115,16 @@ def mjx_roll(mjx_engine):
 
 def test_mjx_agrees_with_mujoco_in_the_air_and_in_a_grip(mjx_engine, mjx_roll, rollout_inputs):
     demos, qpos, qvel, controls, pinching = rollout_inputs
-    wanted = rolled(own_settings(mjx_engine))(demos, qpos, qvel, controls)
+    wanted = rolled(c_engine(mjx_engine))(demos, qpos, qvel, controls)
     found = mjx_roll(demos, qpos, qvel, controls)
-    # Four worlds in contact, whose paths part from rounding on: how far differs from grasp to grasp.
-    assert_agrees(found, wanted, pinching, free=2e-5, touching={0.5: 1e-3, 1.0: 5e-3})
+    assert departure(found, wanted, pinching).complaints(LIMITS["mjx"]) == []
 
 
 def test_mjx_worlds_each_run_their_own_model(mjx_engine, mjx_roll, rollout_inputs):
     demos, qpos, qvel, controls, _ = rollout_inputs
     swapped = mjx_roll(1 - demos, qpos, qvel, controls)
-    right = rolled(own_settings(mjx_engine))(1 - demos, qpos, qvel, controls)
-    wrong = rolled(own_settings(mjx_engine))(demos, qpos, qvel, controls)
+    right = rolled(c_engine(mjx_engine))(1 - demos, qpos, qvel, controls)
+    wrong = rolled(c_engine(mjx_engine))(demos, qpos, qvel, controls)
     tips = [np.abs(np.asarray(swapped.sensordata - other.sensordata)).max() for other in (right, wrong)]
     assert tips[0] < 2e-3 < tips[1]
 
@@ -218,11 +171,11 @@ def test_warp_agrees_with_mujoco_world_by_world(env, family, rollout_inputs, nat
     roll = rolled(engine)
     demos, qpos, qvel, controls, pinching = rollout_inputs
     found = roll(demos, qpos, qvel, controls)
-    assert_agrees(found, native_roll, pinching, free=1e-5, touching={0.5: 5e-5, 1.0: 2e-3})
+    assert departure(found, native_roll, pinching).complaints(LIMITS["warp"]) == []
     assert_resets_only(roll, rollout_inputs)
     assert_refuses_bad_starts(engine, rollout_inputs)
     # Other hands and objects: as the C engine has them, and not as the first model.
-    swapped, right = (r(1 - demos, qpos, qvel, controls) for r in (roll, rolled(own_settings(engine))))
+    swapped, right = (r(1 - demos, qpos, qvel, controls) for r in (roll, rolled(c_engine(engine))))
     tips = [np.abs(np.asarray(swapped.sensordata - other.sensordata)).max() for other in (right, native_roll)]
     assert tips[0] < 2e-3 < tips[1]
     # Nested maps are one call over all worlds.
@@ -242,7 +195,7 @@ def test_warp_drops_objects_of_other_masses_and_sizes_as_mujoco_does(env, demons
     q[:, THING.stop - 1] += 0.03
     controls = np.broadcast_to(q[:, : THING.start], (25, 2, THING.start)).astype(np.float32)
     worlds = (jnp.array([0, 1], jnp.int32), jnp.asarray(q), jnp.zeros((2, models[0].nv)), jnp.asarray(controls))
-    found, wanted = (rolled(e)(*worlds) for e in (engine, own_settings(engine)))
+    found, wanted = (rolled(e)(*worlds) for e in (engine, c_engine(engine)))
     height = np.asarray(wanted.qpos)[-1, :, THING.stop - 1]
     assert height[1] - height[0] > 0.005  # the larger box rests higher
     np.testing.assert_allclose(found.qpos, wanted.qpos, atol=2e-4)

@@ -1,0 +1,129 @@
+"""How fast PPO is on an engine and what the learner's share of it is, and how long a policy takes to learn."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from mjx_hand.errors import InputError
+from mjx_hand.view import plots
+from train.benchmark.contestants import environment, physics
+from train.benchmark.gpu.bench import Bench
+from train.benchmark.gpu.record import Record, Table
+from train.benchmark.gpu.scale import gpu_config
+from train.benchmark.learning import measure_learning
+from train.config import Config
+from train.experiment import World, make_world
+from train.ppo import Point, train
+
+_SAVING = 15.0  # seconds that a training is left for its last evaluation and for saving
+SPEED_COLUMNS = (
+    *("grasp", "set-up", "worlds", "control steps/s", "least", "greatest"),
+    *("physics, about", "learner, about", "compiling, s"),
+)
+
+
+def speed(bench: Bench, engine: str, setup: str, worlds: int, table: Table) -> None:
+    """PPO's control steps a second on the pinch, a row of the table."""
+    world = bench.world(engine, "pinch")
+    config = gpu_config("pinch", bench.scale, bench.demonstrations, bench.out)
+    alone = bench.contestants.get((engine, "pinch", worlds)) or physics(world.env, worlds)
+    around = environment(world.env, worlds)
+    found = measure_learning(config, world, alone, around, bench.scale.runs, bench.scale.seconds)
+    shares = (f"{found.physics_share:.0%}", f"{found.learner_share:.0%}")
+    rate = found.rate
+    table.add("pinch", setup, worlds, rate.median, rate.least, rate.greatest, *shares, found.compile_seconds)
+
+
+@dataclasses.dataclass(frozen=True)
+class Moment:
+    """An evaluation: when it was done (s since the training was begun here), and evaluations' seconds until then."""
+
+    seconds: float
+    evaluating: float
+    point: Point
+
+
+def to_success(
+    bench: Bench, name: str, folder: str, record: Record, keep: Callable[[], None], further: bool = False
+) -> None:
+    """Train an experiment until it is learned, or time is over, and tell where the time went.
+
+    Args:
+        bench: sizes and time.
+        name: of the experiment.
+        folder: of the training, below the benchmark's own.
+        record: for the results.
+        keep: called as they come.
+        further: go on from where the experiment was left, for many more steps.
+    """
+    config = gpu_config(name, bench.scale, bench.demonstrations, bench.out / folder)
+    config = _longer(config, bench.scale.long_steps) if further else dataclasses.replace(config, fresh=True)
+    with bench.timed() as making:
+        world = _world(bench, config, record)
+    engine = world.env.engine.name
+    config = dataclasses.replace(config, engine=engine)
+    table = record.table("steps", "seconds", "of them evaluating", "success", "tracking error, cm")
+    moments: list[Moment] = []
+    began = bench.budget.clock()
+
+    def watch(points: Sequence[Point], evaluating: float) -> bool:
+        if not moments or points[-1] is not moments[-1].point:
+            moment = Moment(bench.budget.clock() - began, evaluating, points[-1])
+            moments.append(moment)
+            last = moment.point
+            table.add(last.steps, moment.seconds, evaluating, last.success, last.tracking_error_cm)
+            bench.say(f"{record.name}: {last.steps:,} steps, success {last.success:.0%}")
+            keep()
+        return not bench.budget.fits(_SAVING)
+
+    points = train(config, world, watch)
+    record.notes.insert(0, _story(config, engine, making[0], moments, points, bench.scale.learned))
+    if points[-1].steps < config.ppo.num_timesteps and points[-1].success < config.checks.stop_at:
+        record.left_out.append(f"what comes after {points[-1].steps:,} steps")
+    steps, success = (np.array([getattr(p, field) for p in points], float) for field in ("steps", "success"))
+    record.figures[f"curve-{record.name}"] = plots.learning_curve(steps, success)
+
+
+def _longer(config: Config, steps: int) -> Config:
+    """The same for more steps, whatever it has learned."""
+    ppo, checks = (
+        dataclasses.replace(config.ppo, num_timesteps=steps),
+        dataclasses.replace(config.checks, stop_at=2.0),
+    )
+    return dataclasses.replace(config, ppo=ppo, checks=checks)
+
+
+def _world(bench: Bench, config: Config, record: Record) -> World:
+    """The training part, made once; on the host's engine, and that is noted, where the GPU's refuses its objects."""
+    engine = bench.scale.training_engine or bench.engine
+    if config.name not in bench.trained:
+        try:
+            world = make_world(dataclasses.replace(config, engine=engine), "train")
+        except InputError as error:
+            if engine == "native":
+                raise
+            record.notes.append(f"Engine {engine} refuses these demonstrations: {error}. Physics is native.")
+            world = make_world(dataclasses.replace(config, engine="native"), "train")
+        bench.trained[config.name] = world
+    return bench.trained[config.name]
+
+
+def _story(
+    config: Config, engine: str, making: float, moments: Sequence[Moment], points: Sequence[Point], learned: float
+) -> str:
+    """Where the time went, in a sentence or two."""
+    first = moments[0]
+    told = (
+        f"{config.name} on {engine}, {config.ppo.num_envs:,} worlds; world made in {making:.1f} s; compiling, "
+        f"the first update and the first evaluation took {first.seconds:.1f} s."
+    )
+    done = next((m for m in moments if m.point.success >= learned), None)
+    if done is None:
+        return f"{told} {learned:.0%} was not reached: {max(p.success for p in points):.0%} at best."
+    evaluating = done.evaluating - first.evaluating
+    learning = done.seconds - first.seconds - evaluating
+    return (
+        f"{told} {learned:.0%} of the demonstrations after {done.seconds:.1f} s and {done.point.steps:,} steps: after "
+        f"the first update {learning:.1f} s of learning (states saved as well) and {evaluating:.1f} s of evaluations."
+    )
