@@ -5,6 +5,8 @@ processor a step costs the same for each world. An accelerator is full only from
 long. What evaluations took is told at the end of a training.
 """
 
+import math
+
 import jax
 
 from envs.tracking import TrackingEnv
@@ -25,7 +27,7 @@ def updates_between(checks: Checks, ppo: Ppo, env: TrackingEnv, repeats: int) ->
         return max(checks.every // ppo.steps_per_update, 1)
     evaluation = env.num_frames * max(env.num_demonstrations * repeats, _full(env))
     update = ppo.unroll_length * max(ppo.num_envs, _full(env))
-    return max(-(-round(evaluation * (1 - SHARE)) // round(update * SHARE)), 1)
+    return max(math.ceil(evaluation * (1 - SHARE) / (update * SHARE)), 1)
 
 
 def _full(env: TrackingEnv) -> int:

@@ -1,19 +1,35 @@
 from types import SimpleNamespace
-from typing import Any
 
 import jax
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from envs.tracking import TrackingEnv
 from train.cadence import FULL, SHARE, rollouts_per_demonstration, updates_between
 from train.options import Checks, Ppo
 
 AUTOMATIC = Checks()
 
 
-def env(demonstrations: int, frames: int = 300, engine: str = "warp") -> Any:
-    return SimpleNamespace(num_demonstrations=demonstrations, num_frames=frames, engine=SimpleNamespace(name=engine))
+class Sized(TrackingEnv):
+    """An environment that has a size and nothing else."""
+
+    def __init__(self, demonstrations: int, frames: int, engine: str):
+        self._size = demonstrations, frames
+        self.engine = SimpleNamespace(name=engine)  # type: ignore[assignment]
+
+    @property
+    def num_demonstrations(self) -> int:
+        return self._size[0]
+
+    @property
+    def num_frames(self) -> int:
+        return self._size[1]
+
+
+def env(demonstrations: int, frames: int = 300, engine: str = "warp") -> TrackingEnv:
+    return Sized(demonstrations, frames, engine)
 
 
 @given(
