@@ -1,6 +1,7 @@
 import csv
 import dataclasses
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -86,6 +87,25 @@ def test_learning_changes_every_layer(trained: Trained, tiny: Config, world: Wor
         assert np.isfinite(after[name]).all()
         assert not np.array_equal(before[name], after[name]), f"{name} did not change"
     assert len(rows(tmp_path / "curve.csv")) == 1
+
+
+def test_a_training_that_is_watched_can_be_ended_and_goes_on(trained: Trained, tiny: Config, world: World, tmp_path):
+    out, _ = trained
+    seen: list[tuple[int, int, float]] = []
+
+    def enough(points: Sequence[Point], evaluating: float) -> bool:
+        seen.append((len(points), points[-1].steps, evaluating))
+        return True
+
+    stopped = train(in_folder(tiny, tmp_path), world, enough)
+    assert [point.steps for point in stopped] == [0, 32]  # an update is 32 steps, after which it is asked
+    ((count, steps, evaluating),) = seen
+    assert (count, steps) == (2, 32)
+    assert 0 < evaluating < stopped[-1].seconds
+    train(in_folder(tiny, tmp_path), world)
+    first, second = arrays(out / "last.npz"), arrays(tmp_path / "last.npz")
+    for key in first:
+        np.testing.assert_array_equal(second[key], first[key])
 
 
 def test_the_same_seed_gives_the_same_policy_bit_for_bit(trained: Trained, tiny: Config, world: World, tmp_path):

@@ -16,13 +16,16 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from envs.demonstrations.dataset import make_set
 from mjx_hand.errors import InputError
+from mjx_hand.view.progress import shares
+from train.benchmark.engines import config
 from train.benchmark.gpu import device, host, learning, peer, physics
 from train.benchmark.gpu.bench import Bench, measured_engine
 from train.benchmark.gpu.budget import Budget
 from train.benchmark.gpu.page import Pages, text
 from train.benchmark.gpu.record import Record
-from train.benchmark.gpu.scale import FULL, REHEARSAL
+from train.benchmark.gpu.scale import FULL, REHEARSAL, Scale, gpu_config
 from train.benchmark.gpu.stages import Stage, run_stages
 from train.benchmark.machine import accelerator
 
@@ -35,7 +38,8 @@ class Options:
 
     Attributes:
         minutes: that all stages together may take.
-        rehearse: run all stages at tiny size, on whatever is here.
+        rehearse: run the stages at tiny size, on whatever is here; mjx, which compiles for minutes, where it is named.
+        prepare: make the demonstration sets that the stages need, on any machine, and measure nothing.
         stages: which to run; all if none is named.
         out: folder for gpu.md, gpu.json, plots and trained policies.
         demonstrations: folder below which demonstration sets are kept, and made where missing.
@@ -43,6 +47,7 @@ class Options:
 
     minutes: float = 9.0
     rehearse: bool = False
+    prepare: bool = False
     stages: tuple[str, ...] = ()
     out: Path = Path("outputs/benchmark/gpu")
     demonstrations: Path = Path("outputs/demonstrations")
@@ -57,14 +62,16 @@ def report(options: Options) -> list[str]:
     """
     if not options.minutes > 0:
         raise InputError(f"minutes is {options.minutes:g}; give more than 0")
+    scale = REHEARSAL if options.rehearse else FULL
+    if options.prepare:
+        return _prepared(scale, options.demonstrations)
     if not options.rehearse and accelerator() is None:
         raise InputError(
             "JAX has no GPU here; on a machine that has one, install its CUDA version with: pip install "
             "'mjx-hand[cuda]', or try all stages at tiny size with --rehearse"
         )
-    scale = REHEARSAL if options.rehearse else FULL
     bench = Bench(scale, Budget.of(options.minutes), measured_engine(), options.out, options.demonstrations)
-    chosen = _chosen(stages(bench), options.stages)
+    chosen = _chosen(stages(bench), options.stages, scale.by_name)
     pages = Pages(options.out, {"minutes": options.minutes, "rehearse": options.rehearse, "engine": bench.engine})
     with (
         contextlib.redirect_stdout(sys.stderr),  # progress; the report alone goes to standard output
@@ -100,27 +107,39 @@ def stages(bench: Bench) -> list[Stage]:
         functools.partial(learning.to_success, bench, several, "learn-several", further=f) for f in (False, True)
     )
     return [
-        stage("machine", "Machine", 2, machine),
-        stage("agreement", f"{engine} beside MuJoCo's C engine", 30, agree),
-        stage("physics", f"Physics of {engine}", 40, functools.partial(sweep, scale.worlds)),
-        stage("peer", "A peer's scene: Newton's cube in an Allegro hand", 45, functools.partial(peer.allegro, bench)),
-        stage("ppo", f"Training's speed on {engine}", 40, ppo),
-        stage("learn", f"Until {one} is learned", 60, functools.partial(learning.to_success, bench, one, "learn")),
+        stage("machine", "Machine", 2.0, machine),
+        stage("agreement", f"{engine} beside MuJoCo's C engine", 30.0, agree),
+        stage("physics", f"Physics of {engine}", 40.0, functools.partial(sweep, scale.worlds)),
+        stage("peer", "A peer's scene: Newton's cube in an Allegro hand", 45.0, functools.partial(peer.allegro, bench)),
+        stage("ppo", f"Training's speed on {engine}", 40.0, ppo),
+        stage("learn", f"Until {one} is learned", 60.0, functools.partial(learning.to_success, bench, one, "learn")),
         stage(
-            "host", "Native physics, alone and with the learner on the GPU", 40, functools.partial(host.on_host, bench)
+            "host",
+            "Native physics, alone and with the learner on the GPU",
+            40.0,
+            functools.partial(host.on_host, bench),
         ),
-        stage("learn-several", f"Until {several} is learned", 60, learn),
-        stage("mjx", "Physics of mjx", 60, mjx),
-        stage("long", f"On with {several} to {scale.long_steps:,} steps", 40, longer),
+        stage("learn-several", f"Until {several} is learned", 60.0, learn),
+        stage("mjx", "Physics of mjx", 60.0, mjx),
+        stage("long", f"On with {several} to {scale.long_steps:,} steps", 40.0, longer),
     ]
 
 
-def _chosen(every: list[Stage], names: tuple[str, ...]) -> list[Stage]:
+def _prepared(scale: Scale, root: Path) -> list[str]:
+    """The folders of the demonstration sets, made where missing."""
+    settings = [config("native", grasp, root).data for grasp in dict.fromkeys(("pinch", *scale.grasps))]
+    for name in dict.fromkeys(scale.trainings):
+        settings += gpu_config(name, scale, root, root).data.of_each_type()
+    with contextlib.redirect_stdout(sys.stderr), shares() as report_share:
+        return [str(make_set(one, root, report_share)) for one in dict.fromkeys(settings)]
+
+
+def _chosen(every: list[Stage], names: tuple[str, ...], by_name: tuple[str, ...]) -> list[Stage]:
     known = [stage.name for stage in every]
     for name in names:
         if name not in known:
             raise InputError(f"stage {name!r} is not known; valid: {', '.join(known)}")
-    return [stage for stage in every if stage.name in (names or known)]
+    return [stage for stage in every if stage.name in (names or set(known) - set(by_name))]
 
 
 @contextlib.contextmanager

@@ -29,6 +29,7 @@ class Scale:
         long_steps: control steps that the last training goes on to.
         peer_worlds: Allegro hands.
         peer_commands: commands that each of them gets in a run.
+        by_name: stages that are run where they are named alone.
         patience: what stages need, as a share of what they need on a GPU.
     """
 
@@ -50,6 +51,7 @@ class Scale:
     long_steps: int = 100_000_000
     peer_worlds: int = 8192
     peer_commands: int = 300
+    by_name: tuple[str, ...] = ()
     patience: float = 1.0
 
 
@@ -72,6 +74,7 @@ REHEARSAL = Scale(
     long_steps=5 * 4 * 2,
     peer_worlds=4,
     peer_commands=2,
+    by_name=("mjx",),  # three functions that compile for a minute each
     patience=0.1,
 )
 
