@@ -64,7 +64,7 @@ smoke: $(STAMP)  ## run a few tests, and a tiny training on every engine, under 
 	  touch $(NEWEST)/.installed; \
 	fi; \
 	$(NEWEST)/bin/python -c 'import jax, platform; print(f"Python {platform.python_version()}, jax {jax.__version__}")'; \
-	$(NEWEST)/bin/python -m pytest -m "" tests/projection/test_project.py tests/train/test_device.py tests/train/test_every_engine.py
+	$(NEWEST)/bin/python -m pytest -m "" tests/projection/test_project.py tests/train/settings/test_device.py tests/train/test_every_engine.py
 
 lint: $(STAMP)  ## check style and formatting
 	$(BIN)/ruff check .

@@ -10,8 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from envs.signed_distance import signed_distance
 from mjx_hand.hand.joints import FINGERS
+from mjx_hand.objects.primitives import signed_distance
 from mjx_hand.rigid.capsules import capsule_points
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand
@@ -47,7 +47,7 @@ def grip_offsets(
         kind, size: the object's shape.
         force: newtons.
         gains: of the position controllers that the offsets are given to.
-        planes: of a mesh (`envs.signed_distance.hull_planes`).
+        planes: of a mesh (`mjx_hand.objects.primitives.hull_planes`).
     """
     pads = jnp.array([k for k, link in enumerate(rigid.capsule_links) if link > 0])
     links = np.array([link for link in rigid.capsule_links if link > 0])

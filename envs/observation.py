@@ -13,7 +13,7 @@ from envs.reference import Reference
 from envs.scene import NUM_WRIST
 from envs.task import Task
 from mjx_hand.hand.joints import NUM_HINGES
-from mjx_hand.motion.demonstration import OBJECT_KINDS
+from mjx_hand.objects.description import OBJECT_KINDS
 from mjx_hand.rotations import axis_angle_matrix, quaternion_difference, quaternion_to_matrix
 
 _NUM_TARGETS = NUM_WRIST + NUM_HINGES

@@ -11,9 +11,10 @@ from scipy.spatial.transform import Rotation
 from envs.grasps import grasp_names, grasp_type
 from envs.grip import grip_offsets
 from envs.scene import NUM_WRIST, base_rotation, wrist_coordinates
-from envs.signed_distance import hull_planes
 from mjx_hand.errors import InputError
-from mjx_hand.motion.demonstration import OBJECT_KINDS, Demonstration, ObjectDescription
+from mjx_hand.motion.demonstration import Demonstration
+from mjx_hand.objects.description import OBJECT_KINDS, ObjectDescription
+from mjx_hand.objects.primitives import hull_planes
 from mjx_hand.pytree import pytree
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand, stack_hands

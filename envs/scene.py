@@ -9,9 +9,10 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from mjx_hand.errors import InputError
-from mjx_hand.motion.demonstration import OBJECT_KINDS, Demonstration, ObjectDescription
+from mjx_hand.motion.demonstration import Demonstration
+from mjx_hand.objects.description import OBJECT_KINDS, ObjectDescription
+from mjx_hand.rigid.export.mjcf import hand_spec
 from mjx_hand.rigid.gains import Gains
-from mjx_hand.rigid.mjcf import hand_spec
 from mjx_hand.rigid.rigid_hand import RigidHand
 
 TIMESTEP = 0.004  # s; 10 ms loses every grasp, 6.7 ms a third of them

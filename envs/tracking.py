@@ -15,7 +15,6 @@ import numpy as np
 from brax.envs.base import Env, State
 from jaxtyping import Array, Float, Int
 
-from envs.kept import kept, model_bytes
 from envs.observation import observe, residual_scale
 from envs.physics import make_engine
 from envs.physics.engine import PhysicsState
@@ -24,6 +23,7 @@ from envs.replay import assisted_replay
 from envs.scene import NUM_WRIST, OBJECT, demonstration_models
 from envs.task import Task
 from mjx_hand.errors import InputError
+from mjx_hand.files.array_cache import kept, model_bytes
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.pytree import pytree

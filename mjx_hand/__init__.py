@@ -9,10 +9,10 @@
 Metres, radians, seconds; quaternions wxyz; MANO's joint order and right-hand frame (`mjx_hand.hand`).
 """
 
-from mjx_hand.capture.fit import fit_markers
 from mjx_hand.capture.load import load_motion
-from mjx_hand.capture.load_markers import load_markers
-from mjx_hand.capture.marker_set import load_marker_set
+from mjx_hand.capture.marker_files.load_markers import load_markers
+from mjx_hand.capture.marker_fit.fit import fit_markers
+from mjx_hand.capture.markers.marker_set import load_marker_set
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
 from mjx_hand.projection import fit_functional_axes, project

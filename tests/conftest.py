@@ -12,7 +12,7 @@ if sys.platform == "linux":
     os.environ.setdefault("MUJOCO_GL", "egl")
 
 # Before any of these packages is imported: every signature's shapes and types are then checked as the tests run.
-install_import_hook(["mjx_hand", "envs", "train"], "beartype.beartype")
+install_import_hook(["mjx_hand", "envs", "train", "tools"], "beartype.beartype")
 
 from mjx_hand.compile_cache import enable_compile_cache  # noqa: E402
 

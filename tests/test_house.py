@@ -1,28 +1,33 @@
 """The house's rules that no linter knows: which way imports run, and that modules stay small."""
 
 import ast
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-TOPS = ("mjx_hand", "envs", "train")
+TOPS = ("mjx_hand", "envs", "train", "tools")
 MODULES = sorted(p for top in TOPS for p in (ROOT / top).rglob("*.py"))
 MAX_LINES = 300
+MAX_FILES = 20  # of a folder
 
 # From the top floor down. A module stands on the floor of its longest name here, and imports from lower floors or
 # its own room; rooms that share a floor do not know each other.
 FLOORS = (
+    ("tools",),
     ("train",),
     ("envs",),
     ("mjx_hand.cli",),
     ("mjx_hand.view",),
-    ("mjx_hand.retarget",),
+    ("mjx_hand.retarget", "mjx_hand.robots"),
     ("mjx_hand.capture", "mjx_hand.projection"),
     ("mjx_hand.rigid",),
     ("mjx_hand.hand",),
     ("mjx_hand.motion",),
+    ("mjx_hand.objects",),
     ("mjx_hand.hand.joints",),  # the order of all arrays
-    ("mjx_hand.rotations", "mjx_hand.pytree", "mjx_hand.compile_cache"),
+    ("mjx_hand.files",),
+    ("mjx_hand.rotations", "mjx_hand.pytree", "mjx_hand.compile_cache", "mjx_hand.progress", "mjx_hand.plugins"),
     ("mjx_hand.errors",),
 )
 FRONT_DOOR = "mjx_hand"  # re-exports the public names, so it opens on every room and no module goes through it
@@ -79,6 +84,29 @@ def test_modules_stay_small():
     lines = {module_name(path): len(path.read_text().splitlines()) for path in MODULES}
     long = {name: count for name, count in lines.items() if count > MAX_LINES}
     assert not long, f"over {MAX_LINES} lines, split at the seam: {long}"
+
+
+def folder_of(path: Path) -> str:
+    """The folder of a module; a `__main__`, which opens on all of a package, is a door of its own."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts if parts[-1] == "__main__" else parts[:-1])
+
+
+def test_folders_do_not_import_each_other_in_a_circle():
+    folders = {module_name(path): folder_of(path) for path in MODULES}
+    below: dict[str, set[str]] = {folder: set() for folder in folders.values()}
+    for path in MODULES:
+        if module_name(path) != FRONT_DOOR:
+            below[folder_of(path)] |= {folders[name] for name in imports(path) if name in folders} - {folder_of(path)}
+    while bottom := {folder for folder, others in below.items() if not others}:
+        below = {folder: others - bottom for folder, others in below.items() if folder not in bottom}
+    assert not below, f"in a circle, or above one: {below}"
+
+
+def test_folders_stay_small():
+    count = Counter(map(folder_of, MODULES))
+    crowded = {folder: files for folder, files in count.items() if files > MAX_FILES}
+    assert not crowded, f"over {MAX_FILES} files, split by concept: {crowded}"
 
 
 def test_no_import_is_relative():

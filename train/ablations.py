@@ -2,8 +2,8 @@
 
     python -m train.ablations [names=[spherical]] [variants=["no grip"]] [results=FOLDER] [any override of train.ppo]
 
-Trains and evaluates every variant of `train/ablations_variants.py`, or those of `variants`, of the experiments of
-`names` (spherical, the hardest), 300,000 control steps a training unless ppo.num_timesteps says otherwise. Overrides
+Trains and evaluates every variant of `train/reports/ablations_variants.py`, or those of `variants`, of the experiments
+of `names` (spherical, the hardest), 300,000 control steps a training unless ppo.num_timesteps says otherwise. Overrides
 hold for all variants alike. Writes `index.html`, `ablations.md` and `ablations.json` to `results` (outputs/ablations)
 after each variant, and trainings below it. What was done before with the same settings is kept, so that the same
 command goes on where it was stopped.
@@ -16,11 +16,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mjx_hand.errors import InputError
-from train.ablations_page import Ablation, write_ablations_page
-from train.ablations_variants import UNCHANGED, VARIANTS, Variant
-from train.config import Config, compose_seeds
-from train.results_table import Experiment
-from train.several import SEEDS, listed, measure, run_command, taken
+from train.experiments import SEEDS, listed, measure, run_command, taken
+from train.reports.ablations_page import Ablation, write_ablations_page
+from train.reports.ablations_variants import UNCHANGED, VARIANTS, Variant
+from train.reports.results_table import Experiment
+from train.settings.config import Config, compose_seeds
 
 NAMES = ("spherical",)
 FOLDER = "outputs/ablations"

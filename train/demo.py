@@ -17,24 +17,25 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from envs.demonstrations.dataset import set_folder
-from envs.published import PAPER
 from mjx_hand.cli.retarget import retarget
 from mjx_hand.hand.joints import FINGERS, LINKS
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion import load_motion_file
+from mjx_hand.progress import clock
 from mjx_hand.retarget.sequence import RetargetErrors, retarget_errors, retarget_sequence, rigid_hand_of
-from mjx_hand.view import plots
-from mjx_hand.view.progress import clock
+from mjx_hand.view.figures import plots
 from mjx_hand.view.report import Film, Headline, Plot, Report, Section, write_report
-from train.benchmark.machine import processor
-from train.config import Config, command
 from train.evaluate import show
-from train.evaluation_page import TRACKING, tables, tracking_plot
-from train.evaluation_record import write_results
-from train.experiment import make_world
-from train.ppo import Point, train
-from train.seeds import POLICY, REPLAY, ZERO, Results, evaluate_seeds, median_and_worst
-from train.video import film
+from train.experiment.evaluate_seeds import POLICY, REPLAY, ZERO, Results, evaluate_seeds, median_and_worst
+from train.experiment.setup import make_world
+from train.learning.curve import Point
+from train.ppo import train
+from train.reports.evaluation_page import TRACKING, tables, tracking_plot
+from train.reports.evaluation_record import write_results
+from train.reports.machine import processor
+from train.reports.published import PAPER
+from train.settings.config import Config, command
+from train.view.video import film
 
 _FILM = "Left the demonstration, right the twin: the held-out rollout of median tracking error."
 _LEARNING = "Share of training demonstrations tracked from frame 0, unassisted. The level is the untrained policy."

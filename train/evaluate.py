@@ -13,10 +13,10 @@ from rich.console import Console
 from rich.table import Table as RichTable
 
 from mjx_hand.view.report import Table, write_report
-from train.config import Config, command_of_seeds
-from train.evaluation_page import evaluation_page, films, tables
-from train.evaluation_record import write_results
-from train.seeds import evaluate_seeds, shared_folder
+from train.experiment.evaluate_seeds import evaluate_seeds, shared_folder
+from train.reports.evaluation_page import evaluation_page, films, tables
+from train.reports.evaluation_record import write_results
+from train.settings.config import Config, command_of_seeds
 
 
 def evaluate_and_write(configs: Sequence[Config]) -> tuple[Path, tuple[Table, ...]]:

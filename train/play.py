@@ -10,14 +10,14 @@ import dataclasses
 from pathlib import Path
 
 from mjx_hand.errors import InputError
-from mjx_hand.view.viewer import Viewer
-from train.config import Config, command
-from train.experiment import World, make_world, rolled_out
-from train.included import included_policy, included_world
-from train.play_scene import rollout_scene
-from train.seeds import median_and_worst
-from train.unstable import load_unstable
-from train.unstable_scene import unstable_scene
+from mjx_hand.view.browser.viewer import Viewer
+from train.experiment.bundled_policies import included_policy, included_world
+from train.experiment.evaluate_seeds import median_and_worst
+from train.experiment.setup import World, make_world, rolled_out
+from train.learning.unstable import load_unstable
+from train.settings.config import Config, command
+from train.view.play_scene import rollout_scene
+from train.view.unstable_scene import unstable_scene
 
 
 def viewer(config: Config) -> Viewer:

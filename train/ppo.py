@@ -15,37 +15,27 @@ import jax
 import numpy as np
 from tensorboardX import SummaryWriter
 
-from envs.evaluation import evaluate
+from envs.evaluation.evaluate import evaluate
+from envs.evaluation.roll_out import make_roll_out
 from envs.parallel import ParallelEnv
-from envs.rolling import make_roll_out
-from mjx_hand.motion.archive import replacing
-from mjx_hand.view.progress import counter
-from train.cadence import rollouts_per_demonstration, updates_between
-from train.checkpoint import Checkpoint, save_checkpoint
-from train.config import Config
-from train.device import described
-from train.experiment import World, make_world
-from train.interruption import interruptions
-from train.learner import Learner, LearnerState, Networks
-from train.policy import deterministic_policy
-from train.processes import agreed, first_alone_speaks, gathered, is_first, join
-from train.run_folder import RunFolder, run_folder
-from train.sweep import sweepable_command
-from train.unstable import UnstableLog
+from mjx_hand.files.npz_archive import replacing
+from mjx_hand.progress import counter
+from train.experiment.setup import World, make_world
+from train.learning.cadence import rollouts_per_demonstration, updates_between
+from train.learning.checkpoint import Checkpoint, save_checkpoint
+from train.learning.curve import Point
+from train.learning.interruption import interruptions
+from train.learning.learner import Learner, LearnerState, Networks
+from train.learning.policy import deterministic_policy
+from train.learning.run_folder import RunFolder, run_folder
+from train.learning.sweep import sweepable_command
+from train.learning.unstable import UnstableLog
+from train.settings.config import Config
+from train.settings.device import described
+from train.settings.processes import agreed, first_alone_speaks, gathered, is_first, join
 
 _LOG_SECONDS = 2.0  # between two lines of training metrics
 Watch = Callable[[Sequence["Point"], float], bool]
-
-
-@dataclasses.dataclass(frozen=True)
-class Point:
-    """One evaluation on the training demonstrations: steps and seconds so far, and scores."""
-
-    steps: int
-    seconds: float
-    success: float
-    tracking_error_cm: float
-    rotation_error_deg: float
 
 
 def train(config: Config, world: World | None = None, watch: Watch | None = None) -> list[Point]:

@@ -14,11 +14,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mjx_hand.errors import InputError
-from train.config import Config, compose_seeds
-from train.results_page import write_results_page
-from train.results_table import FIVE, Experiment
-from train.seeds import shared_folder
-from train.several import SEEDS, listed, measure, run_command, taken
+from train.experiment.evaluate_seeds import shared_folder
+from train.experiments import SEEDS, listed, measure, run_command, taken
+from train.reports.results_page import write_results_page
+from train.reports.results_table import FIVE, Experiment
+from train.settings.config import Config, compose_seeds
 
 FOLDER = "outputs/results"
 

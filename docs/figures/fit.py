@@ -6,18 +6,18 @@ import numpy as np
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from mjx_hand.capture.disturbances import add_ghosts, swap_labels
-from mjx_hand.capture.fit import fit_markers
-from mjx_hand.capture.marker_set import included_marker_set
-from mjx_hand.capture.off_axis import add_off_axis_rotation
-from mjx_hand.capture.predicted_markers import predicted_markers
-from mjx_hand.capture.simulate import simulate_markers
+from mjx_hand.capture.marker_fit.fit import fit_markers
+from mjx_hand.capture.marker_fit.predicted_markers import predicted_markers
+from mjx_hand.capture.markers.marker_set import included_marker_set
+from mjx_hand.capture.simulation.disturbances import add_ghosts, swap_labels
+from mjx_hand.capture.simulation.off_axis import add_off_axis_rotation
+from mjx_hand.capture.simulation.simulate import simulate_markers
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion import Motion
 from mjx_hand.rigid.axes import anatomical_axes
 from mjx_hand.rigid.limits import anatomical_limits
-from mjx_hand.view.fit_figure import fit_figure, fit_snapshots
-from mjx_hand.view.plots import save_figure
+from mjx_hand.view.figures.fit_figure import fit_figure, fit_snapshots
+from mjx_hand.view.figures.plots import save_figure
 
 FRAMES, FPS, SEED = 600, 120.0, 4
 

@@ -12,7 +12,7 @@ from PIL import Image
 from envs.demonstrations.contact_sheet import contact_sheet
 from envs.demonstrations.dataset import SetSettings, load_part, make_set
 from envs.demonstrations.twin_hands import twins
-from mjx_hand.view.progress import shares
+from mjx_hand.progress import shares
 
 TYPES = ("power", "cylindrical", "spherical", "pinch", "lateral")
 

@@ -14,8 +14,8 @@ import mjx_hand
 from mjx_hand.rigid.postures import postures
 from mjx_hand.rigid.rigid_hand import forward_kinematics
 from mjx_hand.rigid.skin_error import posed_skins
-from mjx_hand.view.renderer import open_renderer
-from mjx_hand.view.skin_figure import skin_error_figure
+from mjx_hand.view.figures.skin_figure import skin_error_figure
+from mjx_hand.view.video.renderer import open_renderer
 
 POSTURES = ("fist", "pinch", "spread")
 VIEWS = ((0.15, -1.0, -0.1), (-0.1, -0.25, -1.0))  # looking along: at the back of the hand, and from the thumb's side

@@ -11,9 +11,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 from mjx_hand.projection import project_one_dof, project_two_dof
-from mjx_hand.projection.bch import bch2_two_dof
-from mjx_hand.projection.naive import naive_two_dof
-from mjx_hand.projection.paper import paper_one_dof, paper_two_dof
+from mjx_hand.projection.paper import bch2_two_dof, naive_two_dof, paper_one_dof, paper_two_dof
 from mjx_hand.rotations import axis_angle_matrix, geodesic_angle
 
 HERE = Path(__file__).parent

@@ -9,9 +9,9 @@ import numpy as np
 from PIL import Image
 
 from envs.scene import demonstration_model
-from mjx_hand.view.video import render_frames
-from train.config import compose
-from train.seeds import POLICY, evaluate_checkpoint
+from mjx_hand.view.video.video import render_frames
+from train.experiment.evaluate_seeds import POLICY, evaluate_checkpoint
+from train.settings.config import compose
 
 MOMENTS = (0.05, 0.33, 0.55, 0.75, 0.99)  # shares of the demonstration
 SIZE = (600, 600)  # twice what is kept, so that edges are smooth

@@ -13,8 +13,8 @@ from PIL import Image
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from mjx_hand.cli.view import recording_scene
-from mjx_hand.view.viewer import serving
-from tests.view.browser import find_chromium, page
+from mjx_hand.view.browser.viewer import serving
+from tests.view.browser.chromium import find_chromium, page
 
 OUT = Path(__file__).with_suffix(".png")
 CLOSE = "document.querySelectorAll('.mantine-Notification-closeButton').forEach((button) => button.click())"

@@ -1,0 +1,1 @@
+"""Demonstration sets: made, checked, shown."""

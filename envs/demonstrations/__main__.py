@@ -20,18 +20,18 @@ from PIL import Image
 from envs.demonstrations.contact_sheet import contact_sheet
 from envs.demonstrations.contacts import check_contacts
 from envs.demonstrations.dataset import AS_RECORDED, PARTS, VARIED, YIELD, SetSettings, load_part, make_set
-from envs.demonstrations.perform import OUTCOMES
+from envs.demonstrations.from_recording.demonstration import RECORDED
 from envs.demonstrations.quality import check_part
-from envs.demonstrations.recorded import RECORDED
-from envs.demonstrations.trials import NO_POSTURE, SPARE
+from envs.demonstrations.scripted.perform import OUTCOMES
+from envs.demonstrations.scripted.trials import NO_POSTURE, SPARE
 from envs.demonstrations.twin_hands import twins
 from envs.settings import made_of
 from mjx_hand.cli.output import print_table
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
-from mjx_hand.motion.archive import replacing
-from mjx_hand.view.progress import shares
-from mjx_hand.view.renderer import RendererUnavailable
+from mjx_hand.files.npz_archive import replacing
+from mjx_hand.progress import shares
+from mjx_hand.view.video.renderer import RendererUnavailable
 
 _ROOT = "outputs/demonstrations"
 

@@ -8,8 +8,8 @@ from jaxtyping import UInt8
 from envs.scene import base_rotation, demonstration_model, wrist_coordinates
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.rigid.rigid_hand import RigidHand
-from mjx_hand.view.camera import Camera
-from mjx_hand.view.video import render_frames
+from mjx_hand.view.video.camera import Camera
+from mjx_hand.view.video.video import render_frames
 
 MOMENTS = (0.02, 0.2, 0.35, 0.5, 0.7, 0.98)  # shares of a demonstration's length
 

@@ -9,13 +9,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from envs.demonstrations.dataset import load_part
-from envs.demonstrations.holding import capsule_gaps, last_phalanges
+from envs.demonstrations.from_recording.grasp_pose import capsule_gaps, last_phalanges
 from envs.demonstrations.quality import LIFT
 from envs.demonstrations.twin_hands import twins
 from envs.reference import object_in_hand
-from envs.signed_distance import hull_planes
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import Demonstration
+from mjx_hand.objects.primitives import hull_planes
 from mjx_hand.rigid.rigid_hand import RigidHand, on_device
 
 _RISEN = 0.02  # m: the object is in the hand

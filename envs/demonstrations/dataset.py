@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from envs.demonstrations.record import CaptureSettings, project_recording, record_trials, save_truth
-from envs.demonstrations.recorded import RECORDED, read_demonstration
-from envs.demonstrations.trials import perform_trials
-from envs.demonstrations.variations import RecordingSettings, vary
+from envs.demonstrations.from_recording.demonstration import RECORDED, read_demonstration
+from envs.demonstrations.from_recording.variations import RecordingSettings, vary
+from envs.demonstrations.scripted.simulated_capture import CaptureSettings, project_recording, record_trials, save_truth
+from envs.demonstrations.scripted.trials import perform_trials
 from envs.grasps import grasp_names, grasp_type
 from mjx_hand.capture.datasets.dexmv_object import recording_files
 from mjx_hand.errors import InputError

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.demonstrations.dataset import load_part
-from envs.demonstrations.record import load_truth
+from envs.demonstrations.scripted.simulated_capture import load_truth
 from mjx_hand.errors import InputError
 
 LIFT = 0.095  # m that every demonstration must lift its object: 10 cm, less what soft pads give

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from envs.kept import kept
+from mjx_hand.files.array_cache import kept
 from mjx_hand.hand.load import load_hand
 from mjx_hand.hand.model import HandModel
 from mjx_hand.motion.demonstration import Demonstration

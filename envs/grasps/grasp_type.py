@@ -77,7 +77,7 @@ class GraspType:
 
     Attributes:
         name: as in `config=NAME`.
-        object_kind: one of `motion.demonstration.OBJECT_KINDS`.
+        object_kind: one of `objects.description.OBJECT_KINDS`.
         object_size: smallest and largest size (half extents, or as the kind has them); drawn uniformly, one factor
             for all three, so that a cube stays a cube.
         object_mass, object_friction: ranges.

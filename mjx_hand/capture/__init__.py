@@ -1,0 +1,1 @@
+"""Recordings in: of markers, of keypoints, of datasets, simulated."""

@@ -1,0 +1,1 @@
+"""The command `mjx-hand`, one module a subcommand."""

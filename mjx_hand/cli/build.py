@@ -10,9 +10,9 @@ from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import HINGES, LINKS
 from mjx_hand.hand.load import load_hand
 from mjx_hand.rigid.build import build_rigid_hand
-from mjx_hand.rigid.mesh_folder import filling
-from mjx_hand.rigid.mjcf import write_mjcf
-from mjx_hand.rigid.urdf import write_urdf
+from mjx_hand.rigid.export.mesh_folder import filling
+from mjx_hand.rigid.export.mjcf import write_mjcf
+from mjx_hand.rigid.export.urdf import write_urdf
 
 MOST = 10  # standard deviations of a shape coefficient; a slip of the keyboard makes a thumb of nine kilograms
 

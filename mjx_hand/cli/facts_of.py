@@ -5,19 +5,19 @@ from pathlib import Path
 
 import numpy as np
 
+from mjx_hand.capture.keypoint_files.load_keypoints import chosen, keypoint_contents, recognised
 from mjx_hand.capture.keypoints.layouts import KEYPOINTS
-from mjx_hand.capture.keypoints.load import chosen, keypoint_contents, recognised
 from mjx_hand.capture.keypoints.recording import KeypointRecording
 from mjx_hand.capture.keypoints.side import known_side
-from mjx_hand.capture.labels import label_starts, match_labels
-from mjx_hand.capture.load_markers import load_markers
-from mjx_hand.capture.marker_set import INCLUDED, included_marker_set
-from mjx_hand.capture.recording import MarkerRecording
+from mjx_hand.capture.marker_files.load_markers import load_markers
+from mjx_hand.capture.markers.labels import label_starts, match_labels
+from mjx_hand.capture.markers.marker_recording import MarkerRecording
+from mjx_hand.capture.markers.marker_set import INCLUDED, included_marker_set
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
 from mjx_hand.hand.mano_file import load_mano_file
 from mjx_hand.motion import Demonstration, JointMotion, Motion
-from mjx_hand.retarget.robot_motion import RobotMotion
+from mjx_hand.robots.robot_motion import RobotMotion
 
 Facts = tuple[tuple[str, str], ...]
 

@@ -6,18 +6,18 @@ from pathlib import Path
 from mjx_hand.capture.datasets.contents import read_contents
 from mjx_hand.capture.datasets.dataset_format import dataset_formats
 from mjx_hand.capture.datasets.keypoints import FORMAT as KEYPOINTS
-from mjx_hand.capture.keypoints.load import is_keypoint_file
+from mjx_hand.capture.keypoint_files.load_keypoints import is_keypoint_file
 from mjx_hand.capture.load import load_motion
 from mjx_hand.capture.marker_files.marker_format import marker_formats
-from mjx_hand.capture.recording import SCHEMA as MARKERS
+from mjx_hand.capture.markers.marker_recording import SCHEMA as MARKERS
 from mjx_hand.cli import facts_of
 from mjx_hand.errors import InputError
+from mjx_hand.files.npz_archive import schema_of
 from mjx_hand.motion import load_demonstration, load_joint_motion
-from mjx_hand.motion.archive import schema_of
 from mjx_hand.motion.demonstration import SCHEMA as DEMONSTRATION
 from mjx_hand.motion.joint_motion import SCHEMA as JOINT_MOTION
-from mjx_hand.retarget.robot_motion import SCHEMA as ROBOT_MOTION
-from mjx_hand.retarget.robot_motion import load_robot_motion
+from mjx_hand.robots.robot_motion import SCHEMA as ROBOT_MOTION
+from mjx_hand.robots.robot_motion import load_robot_motion
 
 VIDEOS = (".mp4", ".mov", ".avi", ".webm", ".mkv")
 _MANO_KEYS = {"v_template", "J_regressor", "kintree_table"}
@@ -85,7 +85,7 @@ def _own(path: Path, units: str | None) -> FileFacts | None:
         facts = facts_of.demonstration(load_demonstration(path))
         return FileFacts(f"demonstration ({schema})", facts, (f"mjx-hand view {path}",))
     if schema == ROBOT_MOTION:
-        load = f"in Python: mjx_hand.retarget.robot_motion.load_robot_motion({str(path)!r})"
+        load = f"in Python: mjx_hand.robots.robot_motion.load_robot_motion({str(path)!r})"
         return FileFacts(f"robot motion ({schema})", facts_of.robot_motion(load_robot_motion(path)), (load,))
     if schema == MARKERS:
         return _marker_facts(path, f"markers ({schema})", out, units)

@@ -6,25 +6,25 @@ from typing import Annotated, Literal
 import numpy as np
 import tyro
 
-from mjx_hand.capture.fit import FitSettings, fit_many
-from mjx_hand.capture.fit_report import FitReport
-from mjx_hand.capture.gap_filling import FILL, fill_short_gaps
-from mjx_hand.capture.labels import Labelled, match_labels
-from mjx_hand.capture.load_markers import load_markers
-from mjx_hand.capture.marker_set import MarkerSet, load_marker_set
-from mjx_hand.capture.predicted_markers import predicted_markers
-from mjx_hand.capture.recording import MarkerRecording, hide_marker
+from mjx_hand.capture.marker_files.load_markers import load_markers
+from mjx_hand.capture.marker_fit.fit import FitSettings, fit_many
+from mjx_hand.capture.marker_fit.fit_report import FitReport
+from mjx_hand.capture.marker_fit.predicted_markers import predicted_markers
+from mjx_hand.capture.markers.gap_filling import FILL, fill_short_gaps
+from mjx_hand.capture.markers.labels import Labelled, match_labels
+from mjx_hand.capture.markers.marker_recording import MarkerRecording, hide_marker
+from mjx_hand.capture.markers.marker_set import MarkerSet, load_marker_set
 from mjx_hand.cli.output import check_out, print_table
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import HINGES
 from mjx_hand.hand.load import load_hand
 from mjx_hand.hand.model import HandModel
 from mjx_hand.motion import Motion, load_motion_file, save_motion
+from mjx_hand.progress import counter
 from mjx_hand.retarget.sequence import retarget_sequence, rigid_hand_of
 from mjx_hand.rigid.limits import anatomical_limits
-from mjx_hand.view.fit_figure import fit_figure, fit_snapshots
-from mjx_hand.view.plots import check_figure_path, save_figure
-from mjx_hand.view.progress import counter
+from mjx_hand.view.figures.fit_figure import fit_figure, fit_snapshots
+from mjx_hand.view.figures.plots import check_figure_path, save_figure
 
 IMPOSSIBLE = 3.0  # degrees beyond its range of motion from which a joint angle is counted as impossible
 

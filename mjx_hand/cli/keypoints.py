@@ -6,10 +6,10 @@ from typing import Annotated, Literal
 import numpy as np
 import tyro
 
-from mjx_hand.capture.keypoints.fit import KeypointSettings, fit_keypoints
+from mjx_hand.capture.keypoint_files.load_keypoints import load_keypoints
+from mjx_hand.capture.keypoint_fit.fit import KeypointSettings, fit_keypoints
+from mjx_hand.capture.keypoint_fit.report import KeypointReport
 from mjx_hand.capture.keypoints.layouts import DIGITS
-from mjx_hand.capture.keypoints.load import load_keypoints
-from mjx_hand.capture.keypoints.report import KeypointReport
 from mjx_hand.capture.keypoints.side import known_side
 from mjx_hand.cli.output import check_out, print_table
 from mjx_hand.hand.joints import FINGERS

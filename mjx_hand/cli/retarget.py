@@ -15,13 +15,13 @@ from mjx_hand.cli.output import check_out, print_table, spread
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import LINKS, ONE_DOF, TWO_DOF
 from mjx_hand.motion import Motion, save_joint_motion
+from mjx_hand.progress import counter
 from mjx_hand.retarget.dataset import SUMMARY, retarget_dataset
 from mjx_hand.retarget.hands import KinematicHands
 from mjx_hand.retarget.options import RetargetOptions
 from mjx_hand.retarget.sequence import RetargetErrors, retarget_errors, retarget_many
 from mjx_hand.retarget.summary import DONE, OUTER_JOINTS, Outcome
-from mjx_hand.view.plots import check_figure_path, joint_errors, save_figure
-from mjx_hand.view.progress import counter
+from mjx_hand.view.figures.plots import check_figure_path, joint_errors, save_figure
 
 _SHOWN = 10  # failures that are listed one by one
 _MEGABYTE = 1_000_000

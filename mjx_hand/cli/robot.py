@@ -6,21 +6,21 @@ from typing import Annotated, Literal
 import numpy as np
 import tyro
 
-from mjx_hand.capture.keypoints.load import is_keypoint_file, load_keypoints
+from mjx_hand.capture.keypoint_files.load_keypoints import is_keypoint_file, load_keypoints
 from mjx_hand.capture.keypoints.recording import KeypointRecording
 from mjx_hand.capture.keypoints.side import known_side
 from mjx_hand.capture.load import load_motion
 from mjx_hand.cli.output import check_out, print_table, spread
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
-from mjx_hand.retarget.keypoints import retarget_keypoints
-from mjx_hand.retarget.kinematic_tree import KinematicTree, joint_values
-from mjx_hand.retarget.motion_keypoints import motion_keypoints
-from mjx_hand.retarget.objectives import Objective
-from mjx_hand.retarget.palm_frame import in_palm
-from mjx_hand.retarget.robot_hand import load_robot, robot_objective
-from mjx_hand.retarget.robot_motion import RobotMotion, save_robot_motion, vector_errors
 from mjx_hand.retarget.sequence import rigid_hand_of
+from mjx_hand.robots.motion_keypoints import motion_keypoints
+from mjx_hand.robots.palm_frame import in_palm
+from mjx_hand.robots.robot_hand import load_robot, robot_objective
+from mjx_hand.robots.robot_motion import RobotMotion, save_robot_motion, vector_errors
+from mjx_hand.robots.solver.kinematic_tree import KinematicTree, joint_values
+from mjx_hand.robots.solver.objectives import Objective
+from mjx_hand.robots.solver.retarget_keypoints import retarget_keypoints
 
 
 def robot(
@@ -38,7 +38,7 @@ def robot(
     Args:
         recording: keypoints (.json, .npz or .csv) or a motion of any format that mjx-hand retarget reads.
         urdf: the robot hand's URDF; its meshes are not needed.
-        robot: its description: a name in mjx_hand/retarget/robots, or the path of a file like those.
+        robot: its description: a name in mjx_hand/robots/descriptions, or the path of a file like those.
         out: the .npz to write: the values of all joints.
         objective: what follows what: vector (wrist to finger tips), dexpilot (those, and tips brought together), or
             position (links where the keypoints are, with a base that moves).
@@ -72,7 +72,7 @@ def robot(
         f"{found.source or recording}: a {which} hand, {len(motion.valid)} frames at {motion.fps:g}/s, {gaps} in gaps"
     )
     _report(tree, wanted, vector_errors(keypoints, followed, tree, wanted)[followed.valid])
-    print(f"{out}  load it with mjx_hand.retarget.robot_motion.load_robot_motion({str(out)!r})")
+    print(f"{out}  load it with mjx_hand.robots.robot_motion.load_robot_motion({str(out)!r})")
 
 
 def _recorded(path: Path, side: str | None, sequence: str | None, fps: float | None) -> tuple[KeypointRecording, str]:

@@ -15,9 +15,9 @@ from mjx_hand.hand.model import HandModel
 from mjx_hand.projection import project
 from mjx_hand.rigid.postures import postures
 from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics
-from mjx_hand.rigid.segments import cut
+from mjx_hand.rigid.segmentation.segments import cut
 from mjx_hand.rigid.skin_error import posed_skins
-from mjx_hand.view.skin_figure import skin_error_figure
+from mjx_hand.view.figures.skin_figure import skin_error_figure
 
 TABLE, PICTURE = "skin_error.csv", "skin_error.png"
 _SHOWN = ("fist", "pinch", "spread")

@@ -10,7 +10,7 @@ from mjx_hand.capture.keypoints.recording import save_keypoints
 from mjx_hand.capture.keypoints.video import track_video
 from mjx_hand.cli.output import check_out
 from mjx_hand.errors import InputError
-from mjx_hand.view.progress import counter
+from mjx_hand.progress import counter
 
 FEW = 0.1  # share of the frames below which a hand is taken for a mistake of the tracker
 

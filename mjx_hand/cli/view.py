@@ -5,24 +5,24 @@ from typing import Annotated, Literal
 
 import tyro
 
-from mjx_hand.capture.keypoints.fit import fit_keypoints
-from mjx_hand.capture.keypoints.load import is_keypoint_file, load_keypoints
+from mjx_hand.capture.keypoint_files.load_keypoints import is_keypoint_file, load_keypoints
+from mjx_hand.capture.keypoint_fit.fit import fit_keypoints
 from mjx_hand.capture.keypoints.side import known_side
 from mjx_hand.capture.load import load_motion
-from mjx_hand.capture.load_markers import load_markers
+from mjx_hand.capture.marker_files.load_markers import load_markers
 from mjx_hand.errors import InputError
+from mjx_hand.files.npz_archive import schema_of
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion import demonstration, joint_motion, load_demonstration, load_joint_motion
-from mjx_hand.motion.archive import schema_of
-from mjx_hand.view.recording_scene import (
+from mjx_hand.view.browser.recording_scene import (
     demonstration_scene,
     joint_motion_scene,
     motion_scene,
     with_keypoints,
     with_markers,
 )
-from mjx_hand.view.scene import Scene
-from mjx_hand.view.viewer import PORT, serving
+from mjx_hand.view.browser.scene import Scene
+from mjx_hand.view.browser.viewer import PORT, serving
 
 Up = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 

@@ -1,0 +1,1 @@
+"""The skinned hand: open or licensed."""

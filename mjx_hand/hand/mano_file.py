@@ -1,6 +1,6 @@
 """Licensed MANO files (`MANO_RIGHT.pkl`, `MANO_LEFT.pkl`, or `.npz` of the same keys) as hand models.
 
-The files come from https://mano.is.tue.mpg.de under that site's licence. Nothing in a file is run (`inert_pickle`).
+The files come from https://mano.is.tue.mpg.de under that site's licence. Nothing in a file is run (`safe_pickle`).
 """
 
 import zipfile
@@ -12,10 +12,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from mjx_hand.errors import InputError
-from mjx_hand.hand import inert_pickle
+from mjx_hand.files import safe_pickle
+from mjx_hand.files.npz_archive import open_arrays
 from mjx_hand.hand.joints import NUM_LINKS, PARENTS, TIP_LINKS
 from mjx_hand.hand.model import HandModel
-from mjx_hand.motion.archive import open_arrays
 
 LARGEST = 2**32  # the root's entry in the joint tree; no other number of a hand comes near
 MAX_SHAPE = 10  # some files carry more components than the ten that recordings use
@@ -44,7 +44,7 @@ def load_mano_file(path: str | Path, side: str = "right") -> HandModel:
         if key not in values:
             raise InputError(f"{path}: has no {key!r}; a MANO file has {', '.join(_KEYS)}")
         try:
-            found = inert_pickle.array(values[key])
+            found = safe_pickle.array(values[key])
         except Exception as error:  # a damaged value raises anything at all
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise InputError(f"{path}: cannot read {key!r} ({reason}); copy the file again") from None
@@ -93,7 +93,7 @@ def _values(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: {what}; give a MANO .pkl or .npz, or leave it out to use the open hand")
     if zipfile.is_zipfile(path):
         return dict(open_arrays(path))
-    return inert_pickle.read(path.read_bytes(), str(path))
+    return safe_pickle.read(path.read_bytes(), str(path))
 
 
 def _shaped(path: Path, key: str, get: Callable[[str], np.ndarray], shape: tuple[int | None, ...]) -> np.ndarray:

@@ -1,20 +1,19 @@
 """`Demonstration`: a hand and an object in motion, ready for a physics twin to replay."""
 
-import dataclasses
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
 from mjx_hand.errors import InputError
+from mjx_hand.files.checked_arrays import numbers, text
+from mjx_hand.files.npz_archive import load_arrays, save_arrays
 from mjx_hand.hand.joints import HINGES
-from mjx_hand.motion.archive import load_arrays, save_arrays
 from mjx_hand.motion.joint_motion import JointMotion, joint_motion_of
-from mjx_hand.motion.layout import numbers, text
+from mjx_hand.objects.description import OBJECT_KINDS, ObjectDescription
 from mjx_hand.pytree import pytree, static
 
 SCHEMA = "mjx-hand/demonstration/2"
-OBJECT_KINDS = ("box", "sphere", "cylinder", "capsule", "mesh")
 _LAYOUT: dict[str, tuple[int | str, ...]] = {
     "object_size": (3,),
     "object_mass": (),
@@ -25,28 +24,6 @@ _LAYOUT: dict[str, tuple[int | str, ...]] = {
     "shape": ("s",),
 }
 _HINGES: dict[str, tuple[int | str, ...]] = {"hinge_axis": (20, 3), "rest_rotation": (15, 3, 3)}
-
-
-@pytree
-class ObjectDescription:
-    """A rigid object of simple shape; metres, kilograms.
-
-    Attributes:
-        size: half extents of a box; (radius, 0, 0) of a sphere; (radius, half height, 0) of a cylinder along z;
-            (radius, half length without the round ends, 0) of a capsule along z; of a mesh, how far it reaches from
-            its frame's origin along each axis.
-        mass: uniform density is assumed.
-        friction: sliding coefficient.
-        hulls: of a mesh, the corners of its convex pieces in the object's frame (`envs.convex_pieces`); shorter rows
-            repeat a corner. Empty for the other kinds.
-        kind: one of `OBJECT_KINDS`.
-    """
-
-    size: Float[np.ndarray, "3"]
-    mass: float
-    friction: float
-    hulls: Float[np.ndarray, "h v 3"] = dataclasses.field(default_factory=lambda: np.zeros((0, 0, 3)))
-    kind: str = static()
 
 
 @pytree

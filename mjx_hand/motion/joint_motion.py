@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from mjx_hand.errors import InputError
+from mjx_hand.files.checked_arrays import numbers, text
+from mjx_hand.files.npz_archive import load_arrays, save_arrays
 from mjx_hand.hand.joints import HINGES, NUM_HINGES
-from mjx_hand.motion.archive import load_arrays, save_arrays
-from mjx_hand.motion.layout import numbers, text
 from mjx_hand.pytree import pytree, static
 
 SCHEMA = "mjx-hand/joint-motion/1"

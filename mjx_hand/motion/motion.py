@@ -6,9 +6,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from mjx_hand.errors import InputError
+from mjx_hand.files.checked_arrays import numbers, text
+from mjx_hand.files.npz_archive import load_arrays, save_arrays
 from mjx_hand.hand.joints import FINGERS, NUM_BALL_JOINTS, NUM_LINKS
-from mjx_hand.motion.archive import load_arrays, save_arrays
-from mjx_hand.motion.layout import numbers, text
 from mjx_hand.pytree import pytree, static
 
 SCHEMA = "mjx-hand/motion/1"

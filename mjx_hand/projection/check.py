@@ -1,4 +1,7 @@
-"""Refuses what is not a rotation before it can turn into a wrong angle."""
+"""Refuses what is not a rotation before it can turn into a wrong angle, and multiplies rotations.
+
+Small products are written as sums: they fuse with what follows, and no accelerator rounds them as it may a matmul.
+"""
 
 import jax
 import jax.numpy as jnp
@@ -7,7 +10,6 @@ from jax.core import Tracer
 from jaxtyping import Array, Float, Shaped
 
 from mjx_hand.errors import InputError
-from mjx_hand.projection.products import compose
 
 TOLERANCE = 1e-3  # of R Rᵀ - I and of det R - 1: looser than float32 rounding, tighter than any real mistake
 
@@ -53,3 +55,23 @@ def _worst(rotations: Array) -> tuple[Array, Array]:
     deviation = jnp.maximum(jnp.max(jnp.abs(gram), axis=(-2, -1)), jnp.abs(volume - 1)).ravel()
     where = jnp.argmax(deviation)
     return deviation[where], where
+
+
+def dot(x: Float[Array, "*#b 3"], y: Float[Array, "*#b 3"]) -> Float[Array, "*b"]:
+    """The scalar product x · y."""
+    return jnp.sum(x * y, axis=-1)
+
+
+def turn(rotation: Float[Array, "*#b 3 3"], vector: Float[Array, "*#b 3"]) -> Float[Array, "*b 3"]:
+    """The vector R x."""
+    return jnp.sum(rotation * vector[..., None, :], axis=-1)
+
+
+def compose(first: Float[Array, "*#b 3 3"], second: Float[Array, "*#b 3 3"]) -> Float[Array, "*b 3 3"]:
+    """The matrix A B."""
+    return jnp.sum(first[..., :, :, None] * second[..., None, :, :], axis=-2)
+
+
+def trace(matrix: Float[Array, "*b 3 3"]) -> Float[Array, "*b"]:
+    """The sum of the diagonal; `jnp.trace` masks and sums all nine entries, which costs a third of the projection."""
+    return matrix[..., 0, 0] + matrix[..., 1, 1] + matrix[..., 2, 2]

@@ -12,9 +12,8 @@ from jaxtyping import Array, Bool, Float, Shaped
 
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import HINGE_LINKS, NUM_BALL_JOINTS, NUM_HINGES, ONE_DOF, TWO_DOF
-from mjx_hand.projection.check import check_rotations
+from mjx_hand.projection.check import check_rotations, compose
 from mjx_hand.projection.hinge_parameters import ONE_HINGE, TWO_HINGES, JointKind
-from mjx_hand.projection.products import compose
 from mjx_hand.pytree import replace
 from mjx_hand.rigid.rigid_hand import RigidHand
 

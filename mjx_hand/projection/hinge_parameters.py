@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from mjx_hand.projection.one_dof import project_one_dof
-from mjx_hand.projection.products import compose, turn
-from mjx_hand.projection.two_dof import project_two_dof
+from mjx_hand.projection.check import compose, turn
+from mjx_hand.projection.two_dof import project_one_dof, project_two_dof
 from mjx_hand.rotations import axis_angle_matrix, exp
 
 Axes = Float[Array, "h 3"]

@@ -9,14 +9,9 @@ from jaxtyping import Array, Float, Shaped
 
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import FINGERS, NUM_BALL_JOINTS, NUM_HINGES
-from mjx_hand.projection.bch import bch2_two_dof
-from mjx_hand.projection.check import check_rotations
-from mjx_hand.projection.naive import naive_one_dof, naive_two_dof
-from mjx_hand.projection.one_dof import project_one_dof
-from mjx_hand.projection.paper import paper_one_dof, paper_two_dof
-from mjx_hand.projection.products import compose
-from mjx_hand.projection.two_dof import project_two_dof
-from mjx_hand.projection.within_limits import nearest_within, project_two_dof_within
+from mjx_hand.projection.check import check_rotations, compose
+from mjx_hand.projection.paper import bch2_two_dof, naive_one_dof, naive_two_dof, paper_one_dof, paper_two_dof
+from mjx_hand.projection.two_dof import nearest_within, project_one_dof, project_two_dof, project_two_dof_within
 from mjx_hand.rigid.rigid_hand import RigidHand
 from mjx_hand.rotations import axis_angle_matrix
 

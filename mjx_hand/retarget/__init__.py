@@ -1,0 +1,1 @@
+"""Recordings onto the hinges of the rigid hand."""

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from mjx_hand.errors import InputError
-from mjx_hand.retarget.mesh_distance import signed_distance
+from mjx_hand.objects.mesh_distance import signed_distance
 
 TOUCHING = 0.005  # m; the tip is a point of the skin, but recordings and meshes are off by millimetres
 WEIGHT = 3.0  # of a metre along the surface's normal, against 1 of a metre of the tip's

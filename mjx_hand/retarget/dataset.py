@@ -25,7 +25,7 @@ from mjx_hand.rigid.rigid_hand import RigidHand
 
 SUMMARY = "summary.csv"
 _AHEAD = 2  # recordings read while others are computed
-_TEMPORARY = re.compile(r"\.(?P<stem>.+)-[a-z0-9_]{8}\.npz")  # as `motion.archive.replacing` names them
+_TEMPORARY = re.compile(r"\.(?P<stem>.+)-[a-z0-9_]{8}\.npz")  # as `files.npz_archive.replacing` names them
 
 
 @dataclasses.dataclass(frozen=True)

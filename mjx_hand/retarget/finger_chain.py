@@ -5,7 +5,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from mjx_hand.hand.joints import FINGERS
-from mjx_hand.projection.products import compose, turn
+from mjx_hand.projection.check import compose, turn
 from mjx_hand.pytree import pytree
 from mjx_hand.rigid.rigid_hand import RigidHand
 from mjx_hand.rotations import axis_angle_matrix

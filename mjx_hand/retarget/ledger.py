@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from mjx_hand.errors import InputError
-from mjx_hand.motion.archive import replacing
+from mjx_hand.files.npz_archive import replacing
 from mjx_hand.retarget.summary import Outcome
 
 NAME = ".retarget-ledger.jsonl"

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from mjx_hand.files.npz_archive import replacing
 from mjx_hand.hand.joints import ONE_DOF
 from mjx_hand.motion import Motion
-from mjx_hand.motion.archive import replacing
 from mjx_hand.retarget.sequence import RetargetErrors
 
 DONE, FAILED = "done", "failed"

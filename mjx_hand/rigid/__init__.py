@@ -1,0 +1,1 @@
+"""The rigid hand: its links, hinges, limits and shapes."""

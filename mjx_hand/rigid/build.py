@@ -13,11 +13,11 @@ from mjx_hand.hand.model import HandModel
 from mjx_hand.hand.skinning import joint_centres, shaped_template
 from mjx_hand.rigid.axes import AXES
 from mjx_hand.rigid.collision import palm_capsules, phalanx_capsules, skin_samples
-from mjx_hand.rigid.face_links import face_links
 from mjx_hand.rigid.limits import active_limits, anatomical_limits
-from mjx_hand.rigid.pieces import Piece, close
 from mjx_hand.rigid.rigid_hand import RigidHand
-from mjx_hand.rigid.segments import cut, mass_properties
+from mjx_hand.rigid.segmentation.face_links import face_links
+from mjx_hand.rigid.segmentation.pieces import Piece, close
+from mjx_hand.rigid.segmentation.segments import cut, mass_properties
 
 
 def build_rigid_hand(hand: HandModel, shape: ArrayLike | None = None, axes: str = "anatomical") -> RigidHand:

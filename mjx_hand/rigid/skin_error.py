@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from mjx_hand.hand.model import HandModel
 from mjx_hand.hand.skinning import joint_centres, shaped_template, skin
 from mjx_hand.rigid.rigid_hand import RigidHand, chain, joint_rotations
-from mjx_hand.rigid.segments import cut
+from mjx_hand.rigid.segmentation.segments import cut
 
 
 def posed_skins(

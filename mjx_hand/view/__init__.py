@@ -1,0 +1,1 @@
+"""Plots, videos, the browser's viewer, reports."""

@@ -10,8 +10,8 @@ import jinja2
 from matplotlib.figure import Figure
 
 from mjx_hand.errors import InputError
-from mjx_hand.motion.archive import replacing
-from mjx_hand.view.plots import inline_svg
+from mjx_hand.files.npz_archive import replacing
+from mjx_hand.view.figures.plots import inline_svg
 
 
 @dataclasses.dataclass(frozen=True)

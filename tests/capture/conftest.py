@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mjx_hand.capture.fit import FitReport, fit_many
-from mjx_hand.capture.marker_set import MarkerSet, included_marker_set
-from mjx_hand.capture.recording import MarkerRecording
-from mjx_hand.capture.simulate import simulate_markers
+from mjx_hand.capture.marker_fit.fit import FitReport, fit_many
+from mjx_hand.capture.markers.marker_recording import MarkerRecording
+from mjx_hand.capture.markers.marker_set import MarkerSet, included_marker_set
+from mjx_hand.capture.simulation.simulate import simulate_markers
 from mjx_hand.hand.load import load_hand
 from mjx_hand.hand.model import HandModel
 from mjx_hand.motion import Motion

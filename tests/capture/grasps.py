@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from mjx_hand.capture.off_axis import add_off_axis_rotation
+from mjx_hand.capture.simulation.off_axis import add_off_axis_rotation
 from mjx_hand.hand.model import HandModel
 from mjx_hand.hand.skinning import skin
 from mjx_hand.motion import Motion

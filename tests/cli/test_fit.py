@@ -5,17 +5,17 @@ import pytest
 from PIL import Image
 
 from mjx_hand.capture.load import load_motion
-from mjx_hand.capture.load_markers import load_markers
-from mjx_hand.capture.marker_set import included_marker_set
-from mjx_hand.capture.recording import MarkerRecording, save_recording
-from mjx_hand.capture.simulate import simulate_markers
+from mjx_hand.capture.marker_files.load_markers import load_markers
+from mjx_hand.capture.markers.marker_recording import MarkerRecording, save_recording
+from mjx_hand.capture.markers.marker_set import included_marker_set
+from mjx_hand.capture.simulation.simulate import simulate_markers
 from mjx_hand.cli.main import main
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion import load_motion_file
 from mjx_hand.pytree import replace
 from tests.capture.grasps import errors, grasp
-from tests.capture.marker_files import write_c3d
+from tests.capture.marker_files.written import write_c3d
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mjx_hand.capture.keypoints.recording import KeypointRecording, save_keypoints
-from mjx_hand.capture.marker_set import included_marker_set
+from mjx_hand.capture.markers.marker_set import included_marker_set
 from mjx_hand.cli.main import main
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.hand.load import load_hand

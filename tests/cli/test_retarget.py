@@ -9,8 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mjx_hand.cli.main import main
+from mjx_hand.files.npz_archive import save_arrays
 from mjx_hand.motion import Motion, load_joint_motion, save_motion
-from mjx_hand.motion.archive import save_arrays
 from mjx_hand.motion.motion import SCHEMA
 
 FRAMES = 122  # as the real recording, so that both share one compilation

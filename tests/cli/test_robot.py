@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mjx_hand.cli.main import main
-from mjx_hand.retarget.robot_motion import load_robot_motion
-from tests.retarget.robots import urdf_of
+from mjx_hand.robots.robot_motion import load_robot_motion
+from tests.robots.urdfs import urdf_of
 
 
 def test_keypoints_become_the_robots_joints(recordings, tmp_path, capsys):

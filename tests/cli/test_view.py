@@ -1,17 +1,18 @@
-"""`mjx-hand view`: what it makes of each kind of file. That the page shows a hand, `tests/view/test_viewer.py` sees."""
+"""`mjx-hand view`: what it makes of each kind of file. That the page shows a hand, `tests/view/browser/test_viewer.py`
+sees."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from mjx_hand.capture.recording import MarkerRecording, save_recording
+from mjx_hand.capture.markers.marker_recording import MarkerRecording, save_recording
 from mjx_hand.cli import view as command
 from mjx_hand.cli.main import main
 from mjx_hand.errors import InputError
 from mjx_hand.motion import save_joint_motion, save_motion
-from mjx_hand.view.scene import Scene
-from mjx_hand.view.viewer import Viewer
+from mjx_hand.view.browser.scene import Scene
+from mjx_hand.view.browser.viewer import Viewer
 from tests.capture.keypoints.grips import FPS, FRAMES, grip, keypoints_of
 from tests.cli.test_info import joint_motion
 

@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from envs.rollout import Rollouts
-from mjx_hand.motion.demonstration import ObjectDescription
+from envs.evaluation.rollout import Rollouts
+from mjx_hand.objects.description import ObjectDescription
 
 FPS = 50.0
 CUBE = ObjectDescription(kind="box", size=np.array([0.02, 0.02, 0.02]), mass=0.1, friction=0.9)

@@ -7,9 +7,9 @@ from scipy.spatial.transform import Rotation
 
 from envs.grip import grip_offsets
 from envs.scene import NUM_WRIST, OBJECT, demonstration_model
-from envs.signed_distance import hull_planes
 from mjx_hand.hand.joints import HINGES
-from mjx_hand.motion.demonstration import OBJECT_KINDS
+from mjx_hand.objects.description import OBJECT_KINDS
+from mjx_hand.objects.primitives import hull_planes
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import stack_hands
 

@@ -6,13 +6,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from envs.demonstrations.trials import support_boxes
+from envs.demonstrations.scripted.trials import support_boxes
 from envs.grasps import grasp_type
 from envs.physics import make_engine
 from envs.scene import SPARE, TABLE, demonstration_model, demonstration_models
 from envs.tracking import TrackingEnv, twin_of
 from mjx_hand.errors import InputError
-from mjx_hand.motion.demonstration import ObjectDescription
+from mjx_hand.objects.description import ObjectDescription
 from mjx_hand.pytree import replace
 
 BALL = ObjectDescription(kind="sphere", size=np.array([0.017, 0.0, 0.0]), mass=0.1, friction=1.0)

@@ -10,7 +10,7 @@ from envs.reference import make_reference
 from envs.scene import NUM_WRIST, base_rotation, demonstration_model
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
-from mjx_hand.motion.demonstration import OBJECT_KINDS, ObjectDescription
+from mjx_hand.objects.description import OBJECT_KINDS, ObjectDescription
 from mjx_hand.pytree import replace
 from mjx_hand.rigid.gains import Gains
 

@@ -8,13 +8,13 @@ from hypothesis import strategies as st
 from mujoco import mjx
 from scipy.spatial.transform import Rotation
 
-from envs.demonstrations.trials import support_boxes
+from envs.demonstrations.scripted.trials import support_boxes
 from envs.grasps import grasp_names, grasp_type
 from envs.scene import NUM_WRIST, OBJECT, SUPPORT, TABLE, TIMESTEP, base_rotation, scene_model, wrist_coordinates
-from envs.signed_distance import half_extents
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import HINGES, NUM_HINGES
-from mjx_hand.motion.demonstration import ObjectDescription
+from mjx_hand.objects.description import ObjectDescription
+from mjx_hand.objects.primitives import half_extents
 from mjx_hand.rigid.rigid_hand import forward_kinematics
 
 

@@ -13,8 +13,7 @@ from mjx_hand.hand.mirror import mirrored
 from mjx_hand.hand.model import HandModel
 from mjx_hand.hand.open_hand import load_open_hand
 from mjx_hand.pytree import replace
-
-from .mano_layout import layout, official, write_npz
+from tests.hand.mano_layout import layout, official, write_npz
 
 
 def example(vertices: int | None = None) -> HandModel:

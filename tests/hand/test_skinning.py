@@ -17,8 +17,7 @@ from mjx_hand.hand.model import HandModel
 from mjx_hand.hand.open_hand import load_open_hand
 from mjx_hand.hand.skinning import joint_centres, shaped_template, skin
 from mjx_hand.pytree import replace
-
-from .mano_layout import layout, write_npz
+from tests.hand.mano_layout import layout, write_npz
 
 V = 60  # a thinned hand: the arithmetic is the same and the oracle's loops stay quick
 

@@ -5,22 +5,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from mjx_hand.errors import InputError
+from mjx_hand.files.npz_archive import save_arrays
 from mjx_hand.hand.joints import HINGES
-from mjx_hand.motion import (
-    check_motion,
-    load_joint_motion,
-    load_motion_file,
-    save_joint_motion,
-    save_motion,
-)
-from mjx_hand.motion.archive import save_arrays
-from mjx_hand.motion.demonstration import (
-    Demonstration,
-    ObjectDescription,
-    load_demonstration,
-    save_demonstration,
-)
+from mjx_hand.motion import check_motion, load_joint_motion, load_motion_file, save_joint_motion, save_motion
+from mjx_hand.motion.demonstration import Demonstration, load_demonstration, save_demonstration
 from mjx_hand.motion.motion import SCHEMA
+from mjx_hand.objects.description import ObjectDescription
 from mjx_hand.pytree import replace
 from tests.motion.motions import assert_same, joint_motions, motions
 

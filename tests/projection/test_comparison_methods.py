@@ -4,9 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mjx_hand.projection.bch import bch2_two_dof
-from mjx_hand.projection.naive import naive_two_dof
-from mjx_hand.projection.paper import paper_two_dof
+from mjx_hand.projection.paper import bch2_two_dof, naive_two_dof, paper_two_dof
 from tests.projection.samples import about, anatomical_poses, axis_pairs, random_rotations, residual
 
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from mjx_hand.projection import METHODS, project
-from mjx_hand.projection.within_limits import nearest_within, project_two_dof_within
+from mjx_hand.projection.two_dof import nearest_within, project_two_dof_within
 from mjx_hand.pytree import replace
 from mjx_hand.rigid.rigid_hand import joint_rotations
 from tests.projection.samples import about, axis_pairs, hand_with_axes, hinge_axes, random_rotations, residual

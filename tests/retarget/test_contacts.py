@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 from mjx_hand.capture.load import load_motion
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
+from mjx_hand.objects.mesh_distance import signed_distance
 from mjx_hand.projection import project
 from mjx_hand.retarget.contacts import TOUCHING, contact_normals
-from mjx_hand.retarget.mesh_distance import signed_distance
 from mjx_hand.retarget.refine import recorded_places, refine_angles
 from mjx_hand.retarget.sequence import rigid_hand_of
 from mjx_hand.rigid.rigid_hand import finger_tips

@@ -9,13 +9,7 @@ from mjx_hand.hand.load import load_hand
 from mjx_hand.pytree import replace
 from mjx_hand.retarget.hands import KinematicHands
 from mjx_hand.retarget.options import RetargetOptions
-from mjx_hand.retarget.sequence import (
-    errors_of_many,
-    retarget_errors,
-    retarget_many,
-    retarget_sequence,
-    rigid_hand_of,
-)
+from mjx_hand.retarget.sequence import errors_of_many, retarget_errors, retarget_many, retarget_sequence, rigid_hand_of
 from mjx_hand.rigid.build import build_rigid_hand
 from mjx_hand.rigid.rigid_hand import RigidHand, joint_rotations
 from tests.retarget.test_sequence import motion_of

@@ -8,9 +8,9 @@ import pytest
 from mjx_hand.hand.load import load_hand
 from mjx_hand.hand.model import HandModel
 from mjx_hand.rigid.build import build_rigid_hand
-from mjx_hand.rigid.mjcf import write_mjcf
+from mjx_hand.rigid.export.mjcf import write_mjcf
+from mjx_hand.rigid.export.urdf import write_urdf
 from mjx_hand.rigid.rigid_hand import RigidHand
-from mjx_hand.rigid.urdf import write_urdf
 
 SHAPE = np.array([1.5, -1.0, 0.5, 2.0])  # not the mean, so that tests see the shape space too
 

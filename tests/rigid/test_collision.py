@@ -4,7 +4,7 @@ import trimesh
 
 from mjx_hand.hand.joints import LINKS, TIP_LINKS
 from mjx_hand.rigid.collision import segment_distance, surface_distance
-from mjx_hand.rigid.face_links import face_links
+from mjx_hand.rigid.segmentation.face_links import face_links
 from tests.rigid.conftest import SHAPE
 
 

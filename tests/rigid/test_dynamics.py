@@ -13,9 +13,9 @@ import pytest
 import yourdfpy
 
 from mjx_hand.hand.joints import HINGE_LINKS, HINGES, LINKS, NUM_HINGES, PARENTS
-from mjx_hand.rigid.mjcf import WRIST_SLIDES, WRIST_TURNS, write_mjcf
+from mjx_hand.rigid.export.mjcf import WRIST_SLIDES, WRIST_TURNS, write_mjcf
+from mjx_hand.rigid.export.urdf import write_urdf
 from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics
-from mjx_hand.rigid.urdf import write_urdf
 
 TOLERANCE = 1e-5
 SMALL_LINKS = 2e-7  # kg m^2: what a tip of 1e-5 kg, 10 cm from a knuckle, and the links between two hinges can add

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from mjx_hand.hand.joints import FINGERS, HINGE_LINKS, HINGES, LINKS
 from mjx_hand.hand.skinning import link_transforms
-from mjx_hand.rigid.mjcf import hand_spec
+from mjx_hand.rigid.export.mjcf import hand_spec
 from mjx_hand.rigid.rigid_hand import finger_tips, forward_kinematics, joint_rotations
 
 TOLERANCE = 1e-5

@@ -11,12 +11,12 @@ from mjx_hand.capture.keypoints.layouts import hand_keypoints
 from mjx_hand.hand.joints import HINGE_LINKS, HINGES, LINKS
 from mjx_hand.projection import project
 from mjx_hand.pytree import replace
-from mjx_hand.retarget.human_tree import human_tree
-from mjx_hand.retarget.kinematic_tree import tree_points
 from mjx_hand.rigid.bone_lengths import with_link_offsets
-from mjx_hand.rigid.mjcf import write_mjcf
+from mjx_hand.rigid.export.mjcf import write_mjcf
+from mjx_hand.rigid.export.urdf import write_urdf
 from mjx_hand.rigid.rigid_hand import RigidHand, finger_tips, forward_kinematics, joint_rotations
-from mjx_hand.rigid.urdf import write_urdf
+from mjx_hand.robots.human_tree import human_tree
+from mjx_hand.robots.solver.kinematic_tree import tree_points
 
 
 @pytest.fixture(scope="module")

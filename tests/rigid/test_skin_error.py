@@ -12,7 +12,7 @@ from mjx_hand.pytree import replace
 from mjx_hand.rigid.build import build_rigid_hand
 from mjx_hand.rigid.postures import postures
 from mjx_hand.rigid.rigid_hand import joint_rotations
-from mjx_hand.rigid.segments import cut
+from mjx_hand.rigid.segmentation.segments import cut
 from mjx_hand.rigid.skin_error import posed_skins
 from tests.rigid.conftest import SHAPE
 

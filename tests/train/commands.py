@@ -2,7 +2,7 @@ import dataclasses
 import sys
 from pathlib import Path
 
-from train.config import Config
+from train.settings.config import Config
 
 
 def arguments(config: Config, out: Path, **distributed: object) -> list[str]:

@@ -10,14 +10,14 @@ from filelock import FileLock
 
 import train.ppo
 from envs.demonstrations.dataset import SetSettings, make_set
+from envs.evaluation.roll_out import make_roll_out
 from envs.parallel import ParallelEnv
-from envs.rolling import make_roll_out
 from envs.tracking import TrackingEnv
-from train.config import Config
-from train.experiment import World, make_world
-from train.learner import Learner
-from train.options import Checks, Ppo
-from train.ppo import Point
+from train.experiment.setup import World, make_world
+from train.learning.curve import Point
+from train.learning.learner import Learner
+from train.settings.config import Config
+from train.settings.options import Checks, Ppo
 
 TINY = Ppo(
     num_timesteps=64,

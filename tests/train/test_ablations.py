@@ -10,17 +10,19 @@ import pytest
 
 from mjx_hand.errors import InputError
 from tests.train.test_results import curve, row, summary
-from train import ablations, several, video
+from train import ablations, experiments
 from train.ablations import Plan, plan, run
-from train.ablations_page import Ablation, ablation_table, write_ablations_page
-from train.ablations_variants import UNCHANGED, VARIANTS
-from train.config import Config
-from train.evaluation_record import made_of
-from train.experiment import World
-from train.ppo import Point, _write_curve
-from train.results_table import Experiment
-from train.run_folder import _plain, _settings, run_folder
-from train.seeds import POLICY, REPLAY, ZERO
+from train.experiment.evaluate_seeds import POLICY, REPLAY, ZERO
+from train.experiment.setup import World
+from train.learning.curve import Point
+from train.learning.run_folder import _plain, _settings, run_folder
+from train.ppo import _write_curve
+from train.reports.ablations_page import Ablation, ablation_table, write_ablations_page
+from train.reports.ablations_variants import UNCHANGED, VARIANTS
+from train.reports.evaluation_record import made_of
+from train.reports.results_table import Experiment
+from train.settings.config import Config
+from train.view import video
 
 NO_GRIP = next(variant for variant in VARIANTS if variant.name == "no grip")
 RESIDUAL_OFF, ALONE = (next(variant for variant in VARIANTS if variant.column == column) for column in (ZERO, REPLAY))
@@ -136,10 +138,10 @@ def work(monkeypatch, tmp_path) -> list[str]:
         content = summary("spherical", [1.0] * len(configs)) | {"made_of": made_of(configs)}
         (Path(configs[0].out).parent / "evaluation.json").write_text(json.dumps(content))
 
-    monkeypatch.setattr(several, "make_world", lambda config, part: None)
-    monkeypatch.setattr(several, "train", train)
-    monkeypatch.setattr(several, "evaluate_and_write", evaluate)
-    monkeypatch.setattr(several, "enable_compile_cache", lambda: None)
+    monkeypatch.setattr(experiments, "make_world", lambda config, part: None)
+    monkeypatch.setattr(experiments, "train", train)
+    monkeypatch.setattr(experiments, "evaluate_and_write", evaluate)
+    monkeypatch.setattr(experiments, "enable_compile_cache", lambda: None)
     return done
 
 
@@ -161,8 +163,8 @@ def test_variants_that_are_done_are_shown_while_others_wait(work: list[str], mon
             raise InputError("the disk is full")
         first(config, world)
 
-    first = several.train
-    monkeypatch.setattr(several, "train", train)
+    first = experiments.train
+    monkeypatch.setattr(experiments, "train", train)
     assert ablations.main(["variants=[residual off,no grip]", "seeds=[0,1]", "ppo.num_timesteps=1000"]) == 2
     assert capsys.readouterr().err == "ablations: the disk is full\n"
     assert "Not done yet: spherical (no grip)." in Path("outputs/ablations/ablations.md").read_text()
@@ -171,7 +173,7 @@ def test_variants_that_are_done_are_shown_while_others_wait(work: list[str], mon
 def test_a_tiny_training_and_its_baselines(
     trained: tuple[Path, list[Point]], tiny: Config, world: World, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(several, "make_world", lambda config, part: world)
+    monkeypatch.setattr(experiments, "make_world", lambda config, part: world)
     monkeypatch.setattr(video, "side_by_side", lambda world, rollouts, index, path: Path(path).write_bytes(b"film"))
     out = tmp_path / "tiny" / "as_configured" / "seed0"
     shutil.copytree(trained[0], out)

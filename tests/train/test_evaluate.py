@@ -10,18 +10,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from envs.failure import FAILURES
+from envs.evaluation.failure import FAILURES
 from mjx_hand.errors import InputError
-from mjx_hand.view import video as view_video
-from mjx_hand.view.renderer import RendererUnavailable
-from train import evaluate, evaluation_record, video
-from train.checkpoint import load_checkpoint
-from train.config import Config
+from mjx_hand.view.video import video as view_video
+from mjx_hand.view.video.renderer import RendererUnavailable
+from train import evaluate
 from train.evaluate import evaluate_and_write
-from train.evaluation_page import tables
-from train.evaluation_record import kept_results
-from train.ppo import Point
-from train.seeds import POLICY, REPLAY, ZERO, Results, evaluate_seeds, shared_folder
+from train.experiment.evaluate_seeds import POLICY, REPLAY, ZERO, Results, evaluate_seeds, shared_folder
+from train.learning.checkpoint import load_checkpoint
+from train.learning.curve import Point
+from train.reports import evaluation_record
+from train.reports.evaluation_page import tables
+from train.reports.evaluation_record import kept_results
+from train.settings.config import Config
+from train.view import video
 
 Trained = tuple[Path, list[Point]]
 SEEDS = (4, 7)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from envs.physics import ENGINES
-from train.checkpoint import load_checkpoint
-from train.config import Config
+from train.learning.checkpoint import load_checkpoint
 from train.ppo import train
+from train.settings.config import Config
 
 
 @pytest.mark.slow

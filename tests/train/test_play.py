@@ -6,18 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from envs.rolling import make_roll_out
+from envs.evaluation.roll_out import make_roll_out
 from mjx_hand.errors import InputError
 from mjx_hand.motion.resample import quaternion_matrices
-from mjx_hand.view.scene import Layer, MeshLayer
-from mjx_hand.view.viewer import Viewer
-from tests.view.browser import find_chromium, page
-from train.config import Config
-from train.experiment import chosen_checkpoint, make_world
-from train.options import Play
+from mjx_hand.view.browser.scene import Layer, MeshLayer
+from mjx_hand.view.browser.viewer import Viewer
+from tests.view.browser.chromium import find_chromium, page
+from train.experiment.setup import chosen_checkpoint, make_world
+from train.learning.curve import Point
+from train.learning.policy import deterministic_policy
 from train.play import viewer
-from train.policy import deterministic_policy
-from train.ppo import Point
+from train.settings.config import Config
+from train.settings.options import Play
 
 Trained = tuple[Path, list[Point]]
 

@@ -10,12 +10,13 @@ import pytest
 from omegaconf import OmegaConf
 
 from mjx_hand.errors import InputError
-from train.checkpoint import load_checkpoint, save_checkpoint
-from train.config import Config, compose
-from train.experiment import World, chosen_checkpoint
-from train.options import Checks
-from train.ppo import Point, train
-from train.seeds import POLICY, ZERO, evaluate_checkpoint
+from train.experiment.evaluate_seeds import POLICY, ZERO, evaluate_checkpoint
+from train.experiment.setup import World, chosen_checkpoint
+from train.learning.checkpoint import load_checkpoint, save_checkpoint
+from train.learning.curve import Point
+from train.ppo import train
+from train.settings.config import Config, compose
+from train.settings.options import Checks
 
 Trained = tuple[Path, list[Point]]
 

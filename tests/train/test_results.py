@@ -7,18 +7,18 @@ from typing import Any
 
 import pytest
 
-from envs.failure import FAILURES
-from envs.published import PAPER
+from envs.evaluation.failure import FAILURES
 from mjx_hand.errors import InputError
-from train import results, several
-from train.config import Config
-from train.curve import is_finished, load_curve, minutes_to_learn
-from train.evaluation_record import made_of
-from train.experiment import World
-from train.options import Checks, Ppo
-from train.ppo import Point, _write_curve
-from train.results_page import write_results_page
-from train.results_table import FIVE, Experiment, failures_table, results_table
+from train import experiments, results
+from train.experiment.setup import World
+from train.learning.curve import Point, is_finished, load_curve, minutes_to_learn
+from train.ppo import _write_curve
+from train.reports.evaluation_record import made_of
+from train.reports.published import PAPER
+from train.reports.results_page import write_results_page
+from train.reports.results_table import FIVE, Experiment, failures_table, results_table
+from train.settings.config import Config
+from train.settings.options import Checks, Ppo
 
 METRICS = {"tracking_error_cm": 0.4, "object_rotation_error_deg": 5.0, "hold": 0.9, "chord": 0.8}
 
@@ -212,10 +212,10 @@ def work(monkeypatch, tmp_path) -> list[str]:
         content = summary(configs[0].data.grasp, [1.0] * len(configs)) | {"made_of": made_of(configs)}
         (Path(configs[0].out).parent / "evaluation.json").write_text(json.dumps(content))
 
-    monkeypatch.setattr(several, "make_world", lambda config, part: None)
-    monkeypatch.setattr(several, "train", train)
-    monkeypatch.setattr(several, "evaluate_and_write", evaluate)
-    monkeypatch.setattr(several, "enable_compile_cache", lambda: None)
+    monkeypatch.setattr(experiments, "make_world", lambda config, part: None)
+    monkeypatch.setattr(experiments, "train", train)
+    monkeypatch.setattr(experiments, "evaluate_and_write", evaluate)
+    monkeypatch.setattr(experiments, "enable_compile_cache", lambda: None)
     return done
 
 
@@ -241,8 +241,8 @@ def test_one_experiment_that_is_done_is_shown_while_others_wait(work: list[str],
             raise InputError("the disk is full")
         first(config, world)
 
-    first = several.train
-    monkeypatch.setattr(several, "train", train)
+    first = experiments.train
+    monkeypatch.setattr(experiments, "train", train)
     assert results.main(["names=[pinch,lateral]", "seeds=[0,1]", "ppo.num_timesteps=1000"]) == 2
     assert work == ["train pinch 0", "train pinch 1", "evaluate pinch"]
     assert "Not done yet: lateral." in Path("outputs/results/results.md").read_text()
@@ -252,7 +252,7 @@ def test_ctrl_c_ends_in_one_line(work: list[str], monkeypatch, capsys):
     def stop(config: Config, part: str) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(several, "make_world", stop)
+    monkeypatch.setattr(experiments, "make_world", stop)
     assert results.main(["names=[pinch]", "seeds=[0,1]", "ppo.num_timesteps=1000"]) == 130
     assert capsys.readouterr().err == "\nresults: stopped; the same command goes on from here\n"
 

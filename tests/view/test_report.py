@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mjx_hand.errors import InputError
-from mjx_hand.view.plots import error_over_time, joint_errors, learning_curve
+from mjx_hand.view.figures.plots import error_over_time, joint_errors, learning_curve
 from mjx_hand.view.report import Film, Headline, Plot, Report, Section, Table, write_report
 
 STEPS = np.array([1e5, 2e5])

@@ -1,0 +1,1 @@
+"""Measures this machine: engines, solver settings, projection, retargeting."""

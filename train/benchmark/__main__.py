@@ -10,7 +10,7 @@ import tyro
 
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
-from mjx_hand.motion.archive import replacing
+from mjx_hand.files.npz_archive import replacing
 from train.benchmark import convergence, engines, keypoints, mjbatch, retarget, solver
 from train.benchmark.gpu import command as gpu
 

@@ -25,13 +25,13 @@ from envs.physics.native import NativeEngine
 from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
-from mjx_hand.view.progress import counter
+from mjx_hand.progress import counter
 from train.benchmark.contestants import make_script
 from train.benchmark.engines import config
-from train.benchmark.machine import machine
 from train.benchmark.report_files import write_report
 from train.benchmark.solver import CHOSEN, SWEEP, Settings, newton
-from train.experiment import make_world
+from train.experiment.setup import make_world
+from train.reports.machine import machine
 
 SCHEMA = "mjx-hand/benchmark-convergence/1"
 COMPARED = (CHOSEN, "PGS 10", "PGS 20", "PGS 30", "Newton 10, dense", "Newton 10, sparse", "Newton 100, sparse")

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from mjx_hand.view import plots
+from mjx_hand.view.figures import plots
 from train.benchmark.contestants import Contestant, Memory
 from train.benchmark.learning import Learning
-from train.benchmark.machine import machine
 from train.benchmark.report_files import write_report
 from train.benchmark.timing import Rate
+from train.reports.machine import machine
 
 SCHEMA = "mjx-hand/benchmark-engines/2"
 _PACKAGES = ("mjx-hand", "mujoco", "mujoco-mjx", "jax", "jaxlib", "brax", "numpy")

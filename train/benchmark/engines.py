@@ -20,15 +20,15 @@ from envs.physics.native import cores
 from envs.scene import TIMESTEP
 from envs.task import Task
 from mjx_hand.errors import InputError
-from mjx_hand.view.progress import counter
+from mjx_hand.progress import counter
 from train.benchmark.contestants import Contestant, environment, open_rollout, physics, step_loop
 from train.benchmark.engine_report import Results, Row, text, write
 from train.benchmark.learning import Learning, measure_learning
-from train.benchmark.machine import accelerator
 from train.benchmark.memory import fitting, with_memory
 from train.benchmark.timing import rates
-from train.config import Config
-from train.experiment import World, make_world
+from train.experiment.setup import World, make_world
+from train.reports.machine import accelerator
+from train.settings.config import Config
 
 _CPU_WORLDS, _ACCELERATOR_WORLDS = (1, 16, 64, 256), (1, 256, 1024, 4096)
 _COMPILED_ON_CPU = "pinch"  # the one type of engines that take a minute to compile for each number of worlds

@@ -14,7 +14,7 @@ from jaxtyping import Float
 
 from envs.scene import base_rotation, scene_spec
 from train.benchmark.contestants import Script, make_script
-from train.experiment import World
+from train.experiment.setup import World
 
 _PICTURES = ("vis", "cam_", "light_", "mat_", "tex_", "skin_")
 # MuJoCo 4 says that a position actuator is told a position. Earlier versions cannot read that, and need not: gains and

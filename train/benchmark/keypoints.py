@@ -19,20 +19,20 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import least_squares
 
+from mjx_hand.capture.keypoint_files.load_keypoints import load_keypoints
 from mjx_hand.capture.keypoints.layouts import KEYPOINTS
-from mjx_hand.capture.keypoints.load import load_keypoints
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
-from mjx_hand.retarget.keypoint_stream import KeypointStream
-from mjx_hand.retarget.keypoints import rest_posture, retarget_keypoints
-from mjx_hand.retarget.kinematic_tree import KinematicTree, tree_points
-from mjx_hand.retarget.objectives import Objective
-from mjx_hand.retarget.palm_frame import in_palm
-from mjx_hand.retarget.robot_hand import load_robot, robot_objective
-from mjx_hand.retarget.robot_urdf import robot_tree
 from mjx_hand.rigid.build import build_rigid_hand
-from mjx_hand.rigid.urdf import write_urdf
-from train.benchmark.machine import machine
+from mjx_hand.rigid.export.urdf import write_urdf
+from mjx_hand.robots.palm_frame import in_palm
+from mjx_hand.robots.robot_hand import load_robot, robot_objective
+from mjx_hand.robots.robot_urdf import robot_tree
+from mjx_hand.robots.solver.keypoint_stream import KeypointStream
+from mjx_hand.robots.solver.kinematic_tree import KinematicTree, tree_points
+from mjx_hand.robots.solver.objectives import Objective
+from mjx_hand.robots.solver.retarget_keypoints import rest_posture, retarget_keypoints
+from train.reports.machine import machine
 
 Array = np.ndarray
 HANDS = ("human", "allegro", "shadow", "leap", "inspire", "ability", "schunk")

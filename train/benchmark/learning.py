@@ -8,9 +8,9 @@ import jax
 from envs.parallel import ParallelEnv
 from train.benchmark.contestants import Contestant
 from train.benchmark.timing import Rate, enough_steps, rate_once
-from train.config import Config
-from train.experiment import World
-from train.learner import Learner
+from train.experiment.setup import World
+from train.learning.learner import Learner
+from train.settings.config import Config
 
 
 @dataclasses.dataclass(frozen=True)

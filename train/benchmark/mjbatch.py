@@ -22,7 +22,7 @@ import numpy as np
 from envs.physics import solver
 from envs.physics.native import NativeEngine, cores
 from mjx_hand.errors import InputError
-from mjx_hand.view.progress import counter
+from mjx_hand.progress import counter
 from train.benchmark import entrants
 from train.benchmark.contestants import PASS
 from train.benchmark.engines import config
@@ -30,7 +30,7 @@ from train.benchmark.entrants import Entrant
 from train.benchmark.exchange import make_start, write_scene, write_script
 from train.benchmark.mjbatch_process import INSTALL, MjbatchProcess
 from train.benchmark.mjbatch_report import Results, Row, text, write
-from train.experiment import World, make_world
+from train.experiment.setup import World, make_world
 
 _SETTINGS = {"PGS 15": solver.gauss_seidel, "Newton 10": solver.newton}
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from train.benchmark.machine import machine
 from train.benchmark.report_files import write_report
 from train.benchmark.timing import Rate
+from train.reports.machine import machine
 
 SCHEMA = "mjx-hand/benchmark-mjbatch/1"
 _PACKAGES = ("mjx-hand", "mujoco", "jax", "jaxlib", "numpy")

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from envs.physics.native import cores
-from mjx_hand.motion.archive import replacing
-from train.benchmark.machine import accelerator, processor, versions
+from mjx_hand.files.npz_archive import replacing
+from train.reports.machine import accelerator, processor, versions
 
 
 def write_report(

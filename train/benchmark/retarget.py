@@ -32,7 +32,7 @@ from mjx_hand.retarget.sequence import retarget_errors, retarget_many
 from mjx_hand.rigid.build import build_rigid_hand
 from mjx_hand.rigid.rigid_hand import RigidHand, joint_rotations
 from mjx_hand.rotations import geodesic_angle
-from train.benchmark.machine import machine
+from train.reports.machine import machine
 
 # Mean and largest error (degrees) and ms a pose in the paper's Table 1. Its third column, RMSE 24.31, is
 # larger than its own largest error, so it is not the RMSE of these errors, and is left out.

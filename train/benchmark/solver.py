@@ -16,15 +16,15 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
-from envs.demonstrations.perform import judge, roll_out
-from envs.demonstrations.trials import Script, draw_scripts, script_controls
+from envs.demonstrations.scripted.perform import judge, roll_out
+from envs.demonstrations.scripted.trials import Script, draw_scripts, script_controls
 from envs.grasps import grasp_names, grasp_type
 from envs.physics.solver import gauss_seidel
 from envs.scene import OBJECT
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
+from mjx_hand.progress import counter
 from mjx_hand.rigid.build import build_rigid_hand
-from mjx_hand.view.progress import counter
 from train.benchmark.solver_report import Figures, text, write
 
 _LAST = 0.6  # s at the end, when the object is held still

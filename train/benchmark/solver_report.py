@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from train.benchmark.machine import machine
 from train.benchmark.report_files import write_report
+from train.reports.machine import machine
 
 SCHEMA = "mjx-hand/benchmark-solver/1"
 _PACKAGES = ("mjx-hand", "mujoco", "numpy")

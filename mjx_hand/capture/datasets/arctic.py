@@ -23,8 +23,8 @@ from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Re
 from mjx_hand.capture.datasets.mano_motion import chosen_side, mano_motion, recorded, turns
 from mjx_hand.capture.datasets.subject import full_pose, one_shape, subject_of
 from mjx_hand.errors import InputError
+from mjx_hand.files.checked_arrays import numbers
 from mjx_hand.motion import Motion
-from mjx_hand.motion.layout import numbers
 
 FPS = 30.0
 _FIELDS = ("rot", "pose", "trans", "shape")

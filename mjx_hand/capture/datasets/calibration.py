@@ -9,7 +9,7 @@ import yaml
 from jaxtyping import Float
 
 from mjx_hand.errors import InputError
-from mjx_hand.motion.layout import numbers
+from mjx_hand.files.checked_arrays import numbers
 
 
 def read_settings(path: Path, needed: Mapping[str, type]) -> dict[str, Any]:

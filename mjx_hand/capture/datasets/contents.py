@@ -1,6 +1,6 @@
 """What a file holds: named values, or a list of them, read without running anything that the file names.
 
-Datasets ship pickles, and `.npy` and `.npz` files with pickles inside. All of them go through `hand.inert_pickle`;
+Datasets ship pickles, and `.npy` and `.npz` files with pickles inside. All of them go through `files.safe_pickle`;
 what is not an array of numbers stays a record until `plain` is asked for it.
 """
 
@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from mjx_hand.errors import InputError
-from mjx_hand.hand import inert_pickle
-from mjx_hand.hand.inert_tensor import is_tensor, tensor
+from mjx_hand.files import safe_pickle
+from mjx_hand.files.safe_tensor import is_tensor, tensor
 
 PICKLES = (".pkl", ".pickle", ".p")
 WHOLE = ""  # the name of a value that is not a dictionary of named ones
@@ -44,7 +44,7 @@ def read_contents(path: Path) -> dict[str, Any]:
 
 def unwrapped(value: Any) -> Any:
     """What NumPy wrapped as an array of objects: the object of a lone one, else the list of them."""
-    if not isinstance(value, inert_pickle.Record) or not value.name.endswith("._reconstruct"):
+    if not isinstance(value, safe_pickle.Record) or not value.name.endswith("._reconstruct"):
         return value
     _, shape, dtype, _, data = value.state
     if not dtype.args[0].startswith("O") or not isinstance(data, list):
@@ -69,7 +69,7 @@ def plain(path: str | Path, name: str, value: Any) -> np.ndarray:
             return tensor(found)
         if isinstance(found, list | tuple):
             return np.stack([plain(path, name, item) for item in found]) if found else np.zeros(0)
-        return inert_pickle.array(found)
+        return safe_pickle.array(found)
     except InputError:
         raise
     except Exception as error:  # a damaged value raises anything at all
@@ -78,7 +78,7 @@ def plain(path: str | Path, name: str, value: Any) -> np.ndarray:
 
 
 def _unpickled(data: bytes, where: str) -> Any:
-    return inert_pickle.unpickle(data, where, "recording", "its publisher")
+    return safe_pickle.unpickle(data, where, "recording", "its publisher")
 
 
 def _archive(path: Path) -> dict[str, Any]:

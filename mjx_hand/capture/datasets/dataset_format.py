@@ -1,13 +1,12 @@
 """`DatasetFormat`: what one importer offers, what it is asked for, and the list of all of them."""
 
 import dataclasses
-import importlib
-import pkgutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from mjx_hand.motion import Motion
+from mjx_hand.plugins import plugins
 
 Contents = Mapping[str, Any]
 
@@ -50,6 +49,4 @@ class DatasetFormat:
 
 def dataset_formats() -> list[DatasetFormat]:
     """The `FORMAT` of every module in `mjx_hand.capture.datasets`, in the order of the modules' names."""
-    package = importlib.import_module("mjx_hand.capture.datasets")
-    modules = [importlib.import_module(f"{package.__name__}.{m.name}") for m in pkgutil.iter_modules(package.__path__)]
-    return [module.FORMAT for module in modules if hasattr(module, "FORMAT")]
+    return plugins("mjx_hand.capture.datasets", "FORMAT")

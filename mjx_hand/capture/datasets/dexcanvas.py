@@ -28,8 +28,8 @@ from mjx_hand.capture.datasets.joint_places import subject_with_joints
 from mjx_hand.capture.datasets.mano_motion import chosen_side, mano_motion, recorded, turns
 from mjx_hand.capture.datasets.subject import one_shape, subject_of
 from mjx_hand.errors import InputError
+from mjx_hand.files.checked_arrays import numbers
 from mjx_hand.motion import Motion
-from mjx_hand.motion.layout import numbers
 
 FPS = 100.0
 _NEEDED = ("mano_global_pos", "mano_global_rot_aa", "mano_hand_pose")

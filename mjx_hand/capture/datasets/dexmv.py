@@ -21,9 +21,9 @@ from scipy.spatial.transform import Rotation
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
 from mjx_hand.capture.datasets.joint_places import offsets_in_parents
 from mjx_hand.errors import InputError
+from mjx_hand.files.checked_arrays import numbers
 from mjx_hand.hand.joints import FINGERS, LINKS, PARENTS, TIP_LINKS
 from mjx_hand.motion import Motion, check_motion
-from mjx_hand.motion.layout import numbers
 from mjx_hand.motion.resample import matrix_quaternions
 
 FPS = 25.0  # of every published sequence; the files do not say

@@ -13,8 +13,8 @@ import trimesh
 from jaxtyping import Float, Int
 
 from mjx_hand.errors import InputError
-from mjx_hand.motion.archive import open_arrays
-from mjx_hand.motion.layout import numbers
+from mjx_hand.files.checked_arrays import numbers
+from mjx_hand.files.npz_archive import open_arrays
 
 _LAYOUT: dict[str, tuple[int | str, ...]] = {"object_pose_objcam": ("t", 3, 4), "hand_cam_to_object_cam": (4, 4)}
 

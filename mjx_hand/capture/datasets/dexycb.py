@@ -20,8 +20,8 @@ from mjx_hand.capture.datasets.contents import read_contents
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
 from mjx_hand.capture.datasets.mano_motion import chosen_side, mano_motion, recorded, some, turns
 from mjx_hand.capture.datasets.subject import full_pose, subject_of
+from mjx_hand.files.checked_arrays import numbers
 from mjx_hand.motion import Motion
-from mjx_hand.motion.layout import numbers
 
 FPS = 30.0
 

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from mjx_hand.capture.datasets.contents import plain, unwrapped
 from mjx_hand.errors import InputError
-from mjx_hand.motion.layout import numbers
+from mjx_hand.files.checked_arrays import numbers
 
 Array = np.ndarray
 _PARAMETERS = ("global_orient", "hand_pose", "betas")

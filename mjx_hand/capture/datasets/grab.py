@@ -24,9 +24,9 @@ from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Re
 from mjx_hand.capture.datasets.mano_motion import chosen_side, mano_motion, recorded, turns
 from mjx_hand.capture.datasets.subject import full_pose, subject_of
 from mjx_hand.errors import InputError
+from mjx_hand.files.checked_arrays import numbers
 from mjx_hand.hand.mano_file import MANO_VERTICES
 from mjx_hand.motion import Motion
-from mjx_hand.motion.layout import numbers
 
 _KEYS = {"right": "rhand", "left": "lhand"}
 

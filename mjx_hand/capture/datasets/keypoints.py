@@ -7,8 +7,8 @@ the same motion and also filters, and reports how far it is from the keypoints.
 from pathlib import Path
 
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
-from mjx_hand.capture.keypoints.fit import fit_keypoints
-from mjx_hand.capture.keypoints.load import keypoint_contents, load_keypoints, recognised
+from mjx_hand.capture.keypoint_files.load_keypoints import keypoint_contents, load_keypoints, recognised
+from mjx_hand.capture.keypoint_fit.fit import fit_keypoints
 from mjx_hand.capture.keypoints.side import known_side
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion import Motion

@@ -24,8 +24,8 @@ from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Re
 from mjx_hand.capture.datasets.mano_motion import LONGEST, chosen_side, mano_motion, recorded, some
 from mjx_hand.capture.datasets.subject import one_shape, subject_of
 from mjx_hand.errors import InputError
+from mjx_hand.files.checked_arrays import numbers
 from mjx_hand.motion import Motion
-from mjx_hand.motion.layout import numbers
 
 CAPTURE_FPS = 120.0
 _KEYS = {"right": "rh", "left": "lh"}

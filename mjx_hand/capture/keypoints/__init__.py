@@ -1,0 +1,1 @@
+"""Keypoints of a hand: names, layouts, sizes, times, side."""

@@ -7,8 +7,8 @@ from jaxtyping import Float
 
 from mjx_hand.capture.keypoints.layouts import KEYPOINTS, NUM_KEYPOINTS
 from mjx_hand.errors import InputError
-from mjx_hand.motion.archive import load_arrays, save_arrays
-from mjx_hand.motion.layout import numbers, text
+from mjx_hand.files.checked_arrays import numbers, text
+from mjx_hand.files.npz_archive import load_arrays, save_arrays
 from mjx_hand.pytree import pytree, static
 
 SCHEMA = "mjx-hand/keypoints/1"

@@ -1,4 +1,5 @@
-"""Hands in a video, as keypoints, through MediaPipe (https://ai.google.dev/edge/mediapipe/solutions/vision/hand_landmarker).
+"""Hands in a video, as keypoints, through MediaPipe
+(https://ai.google.dev/edge/mediapipe/solutions/vision/hand_landmarker).
 
 MediaPipe is an extra (`.[video]`). Release 0.10.14 is the last whose wheel carries the hand model itself and allows
 NumPy 2; later ones fetch a model when they run. Its world landmarks are metres about the middle of the hand in the

@@ -14,7 +14,7 @@ from mjx_hand.capture.marker_files.c3d_header import LONG, C3DHeader, read_heade
 from mjx_hand.capture.marker_files.c3d_parameters import Parameters, read_parameters
 from mjx_hand.capture.marker_files.marker_format import MarkerFormat
 from mjx_hand.capture.marker_files.samples import recording_of
-from mjx_hand.capture.recording import MarkerRecording
+from mjx_hand.capture.markers.marker_recording import MarkerRecording
 from mjx_hand.errors import InputError
 
 _DIRECTIONS = ("+X", "+Y", "+Z", "-X", "-Y", "-Z")

@@ -16,9 +16,9 @@ import numpy as np
 
 from mjx_hand.capture.marker_files.marker_format import MarkerFormat
 from mjx_hand.capture.marker_files.samples import recording_of
-from mjx_hand.capture.marker_files.text_table import numbers_of, positive, read_lines
-from mjx_hand.capture.recording import MarkerRecording
+from mjx_hand.capture.markers.marker_recording import MarkerRecording
 from mjx_hand.errors import InputError
+from mjx_hand.files.text_table import numbers_of, positive, read_lines
 
 _TIME = ("time", "t", "timestamp")
 _UNEVEN = 0.5  # share of the mean step by which a step may differ: rounded times do, a dropped frame by more

@@ -1,12 +1,11 @@
 """`MarkerFormat`: what one reader of marker files offers, and the list of all of them."""
 
 import dataclasses
-import importlib
-import pkgutil
 from collections.abc import Callable
 from pathlib import Path
 
-from mjx_hand.capture.recording import MarkerRecording
+from mjx_hand.capture.markers.marker_recording import MarkerRecording
+from mjx_hand.plugins import plugins
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,6 +26,4 @@ class MarkerFormat:
 
 def marker_formats() -> list[MarkerFormat]:
     """The `FORMAT` of every module in `mjx_hand.capture.marker_files`, in the order of the modules' names."""
-    package = importlib.import_module("mjx_hand.capture.marker_files")
-    modules = [importlib.import_module(f"{package.__name__}.{m.name}") for m in pkgutil.iter_modules(package.__path__)]
-    return [module.FORMAT for module in modules if hasattr(module, "FORMAT")]
+    return plugins("mjx_hand.capture.marker_files", "FORMAT")

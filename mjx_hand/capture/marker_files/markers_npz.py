@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from mjx_hand.capture.marker_files.marker_format import MarkerFormat
-from mjx_hand.capture.recording import SCHEMA, MarkerRecording, load_recording_file
+from mjx_hand.capture.markers.marker_recording import SCHEMA, MarkerRecording, load_recording_file
 from mjx_hand.errors import InputError
 
 

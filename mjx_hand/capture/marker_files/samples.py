@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from mjx_hand.capture.recording import MarkerRecording, check_recording
+from mjx_hand.capture.markers.marker_recording import MarkerRecording, check_recording
 from mjx_hand.errors import InputError
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}

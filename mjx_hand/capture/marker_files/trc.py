@@ -10,9 +10,9 @@ from pathlib import Path
 
 from mjx_hand.capture.marker_files.marker_format import MarkerFormat
 from mjx_hand.capture.marker_files.samples import recording_of
-from mjx_hand.capture.marker_files.text_table import check_count, numbers_of, positive, read_lines
-from mjx_hand.capture.recording import MarkerRecording
+from mjx_hand.capture.markers.marker_recording import MarkerRecording
 from mjx_hand.errors import InputError
+from mjx_hand.files.text_table import check_count, numbers_of, positive, read_lines
 
 
 def _read(path: Path, units: str | None) -> MarkerRecording:

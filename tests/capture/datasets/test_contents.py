@@ -14,7 +14,7 @@ from hypothesis.extra.numpy import array_shapes, arrays
 from mjx_hand.capture.datasets.contents import WHOLE, plain, read_contents
 from mjx_hand.capture.load import load_motion
 from mjx_hand.errors import InputError
-from tests.hand.torch_layout import Tensor, dumps
+from tests.files.torch_layout import Tensor, dumps
 
 
 class Evil:

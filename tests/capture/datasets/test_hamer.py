@@ -15,7 +15,7 @@ from tests.capture.datasets.subjects import (
     rest_joints,
     take,
 )
-from tests.hand.torch_layout import Tensor, dumps
+from tests.files.torch_layout import Tensor, dumps
 
 TAKE = take(seed=6)
 FRAMES = 6

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from mjx_hand.capture.load import load_motion
 from mjx_hand.errors import InputError
 from tests.capture.datasets.subjects import joints_of, licensed_file, licensed_hand, posed_joints, rest_joints, take
-from tests.hand.torch_layout import Tensor, dumps
+from tests.files.torch_layout import Tensor, dumps
 
 TAKE = take(seed=4)
 QUATERNIONS = Rotation.from_rotvec(TAKE.pose.reshape(-1, 3)).as_quat(scalar_first=True).reshape(6, 1, 16, 4)

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from envs.demonstrations import dataset
 from envs.demonstrations.dataset import PARTS, SetSettings, load_part, make_set, set_folder
-from envs.demonstrations.record import CaptureSettings, load_truth
+from envs.demonstrations.scripted.simulated_capture import CaptureSettings, load_truth
 from envs.demonstrations.twin_hands import twins
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import load_demonstration, save_demonstration

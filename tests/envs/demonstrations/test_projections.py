@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from envs.demonstrations import dataset
 from envs.demonstrations.dataset import PARTS, SetSettings, load_part, make_set, set_folder, told_apart_by
-from envs.demonstrations.record import CaptureSettings
+from envs.demonstrations.scripted.simulated_capture import CaptureSettings
 from envs.demonstrations.twin_hands import twins
 from envs.tracking import TrackingEnv, twin_of
 from mjx_hand.errors import InputError
@@ -20,8 +20,8 @@ from mjx_hand.motion.demonstration import Demonstration, load_demonstration, sav
 from mjx_hand.motion.motion import Motion, load_motion_file
 from mjx_hand.retarget.refine import recorded_places
 from mjx_hand.rigid.rigid_hand import RigidHand, finger_tips, forward_kinematics, joint_rotations
-from mjx_hand.view.recording_scene import demonstration_scene
-from mjx_hand.view.scene import SkinLayer
+from mjx_hand.view.browser.recording_scene import demonstration_scene
+from mjx_hand.view.browser.scene import SkinLayer
 from tests.envs.conftest import SETTINGS
 
 

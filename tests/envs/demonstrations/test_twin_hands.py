@@ -3,8 +3,8 @@
 import jax
 import numpy as np
 
-from envs import kept as kept_module
 from envs.demonstrations import twin_hands
+from mjx_hand.files import array_cache as kept_module
 from mjx_hand.hand.load import load_hand
 from mjx_hand.pytree import replace
 from mjx_hand.rigid.build import build_rigid_hand

@@ -4,7 +4,7 @@ import pytest
 from envs.grasps import Pads, grasp_names, grasp_type
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import HINGES, LINKS
-from mjx_hand.motion.demonstration import OBJECT_KINDS
+from mjx_hand.objects.description import OBJECT_KINDS
 from mjx_hand.rigid.limits import anatomical_limits
 
 

@@ -6,7 +6,7 @@ from train.benchmark import convergence
 from train.benchmark.__main__ import main
 from train.benchmark.engines import config
 from train.benchmark.solver import CHOSEN
-from train.experiment import make_world
+from train.experiment.setup import make_world
 
 
 def test_more_sweeps_end_nearer_to_the_solution(demonstrations, tmp_path, capsys, monkeypatch):

@@ -14,7 +14,7 @@ from train.benchmark.__main__ import main
 from train.benchmark.contestants import Contestant
 from train.benchmark.memory import fitting, with_memory
 from train.benchmark.timing import rates
-from train.experiment import make_world
+from train.experiment.setup import make_world
 
 TINY = ("--grasps", "pinch", "--engines", "native", "--worlds", "1", "2", "--runs", "2", "--seconds", "0.01")
 

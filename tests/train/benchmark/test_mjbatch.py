@@ -17,7 +17,7 @@ from train.benchmark.engines import config
 from train.benchmark.exchange import make_start, numbers, scene_xml, write_scene, write_script
 from train.benchmark.mjbatch_process import MjbatchProcess
 from train.benchmark.mjbatch_report import Results, Row, text
-from train.experiment import make_world
+from train.experiment.setup import make_world
 
 PYTHON = os.environ.get("MJX_HAND_MJBATCH_PYTHON")
 TINY = ("--worlds", "1", "3", "--rounds", "2", "--seconds", "0.01", "--threads", "2")

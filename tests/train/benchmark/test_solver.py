@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from envs.demonstrations.trials import draw_scripts
+from envs.demonstrations.scripted.trials import draw_scripts
 from envs.grasps import grasp_type
 from mjx_hand.hand.load import load_hand
 from mjx_hand.rigid.build import build_rigid_hand

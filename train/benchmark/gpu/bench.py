@@ -8,14 +8,14 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from envs.physics import default_engine
-from mjx_hand.view.progress import clock
+from mjx_hand.progress import clock
 from train.benchmark.contestants import Contestant
 from train.benchmark.engines import config
 from train.benchmark.gpu.budget import Budget
 from train.benchmark.gpu.record import Record
 from train.benchmark.gpu.scale import Scale
-from train.benchmark.machine import accelerator
-from train.experiment import World, make_world
+from train.experiment.setup import World, make_world
+from train.reports.machine import accelerator
 
 
 def measured_engine() -> str:

@@ -18,7 +18,7 @@ from typing import Any
 
 from envs.demonstrations.dataset import make_set
 from mjx_hand.errors import InputError
-from mjx_hand.view.progress import shares
+from mjx_hand.progress import shares
 from train.benchmark.engines import config
 from train.benchmark.gpu import device, host, learning, peer, physics
 from train.benchmark.gpu.bench import Bench, measured_engine
@@ -27,7 +27,7 @@ from train.benchmark.gpu.page import Pages, text
 from train.benchmark.gpu.record import Record
 from train.benchmark.gpu.scale import FULL, REHEARSAL, Scale, gpu_config
 from train.benchmark.gpu.stages import Stage, run_stages
-from train.benchmark.machine import accelerator
+from train.reports.machine import accelerator
 
 _GRACE = 25.0  # seconds after the end, in which what cannot be interrupted (a compiler) may end by itself
 

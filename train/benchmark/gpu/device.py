@@ -10,7 +10,7 @@ import jax
 from envs.physics.native import cores
 from train.benchmark.gpu.page import PACKAGES
 from train.benchmark.gpu.record import Record
-from train.benchmark.machine import accelerator, processor, versions
+from train.reports.machine import accelerator, processor, versions
 
 _ASKED = ("name", "driver_version", "memory.total", "power.limit", "clocks.max.sm", "mig.mode.current")
 _TIMEOUT = 20.0  # seconds

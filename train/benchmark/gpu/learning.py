@@ -6,15 +6,16 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from mjx_hand.errors import InputError
-from mjx_hand.view import plots
+from mjx_hand.view.figures import plots
 from train.benchmark.contestants import environment, physics
 from train.benchmark.gpu.bench import Bench
 from train.benchmark.gpu.record import Record, Table
 from train.benchmark.gpu.scale import gpu_config
 from train.benchmark.learning import measure_learning
-from train.config import Config
-from train.experiment import World, make_world
-from train.ppo import Point, train
+from train.experiment.setup import World, make_world
+from train.learning.curve import Point
+from train.ppo import train
+from train.settings.config import Config
 
 _SAVING = 15.0  # seconds that a training is left for its last evaluation and for saving
 SPEED_COLUMNS = (

@@ -6,11 +6,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from mjx_hand.motion.archive import replacing
-from mjx_hand.view import plots
+from mjx_hand.files.npz_archive import replacing
+from mjx_hand.view.figures import plots
 from train.benchmark.gpu.record import DONE, Cell, Record, Table
-from train.benchmark.machine import machine
 from train.benchmark.report_files import write_report
+from train.reports.machine import machine
 
 NAME, SCHEMA = "gpu", "mjx-hand/benchmark-gpu/1"
 _WHERE_INSTALLED = {"warp-lang": "warp", "dexi-rs": "dexi_rs"}

@@ -10,7 +10,7 @@ import numpy as np
 from envs.agreement import LIMITS, c_engine, departure, free_and_gripping, rolled
 from envs.physics.solver_load import solver_load
 from envs.tracking import TrackingEnv
-from mjx_hand.view import plots
+from mjx_hand.view.figures import plots
 from train.benchmark.contestants import make_script, physics
 from train.benchmark.gpu.bench import Bench
 from train.benchmark.gpu.device import memory_in_use

@@ -4,7 +4,7 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
-from train.config import Config, compose
+from train.settings.config import Config, compose
 
 
 @dataclasses.dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol, runtime_checkable
 
 from mjx_hand.errors import InputError
-from mjx_hand.view.progress import clock
+from mjx_hand.progress import clock
 from train.benchmark.gpu.budget import Budget
 from train.benchmark.gpu.record import DONE, FAILED, INTERRUPTED, SHORTENED, SKIPPED, UNDER_WAY, Record
 

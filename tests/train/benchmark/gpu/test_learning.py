@@ -9,7 +9,7 @@ from train.benchmark.gpu.bench import Bench
 from train.benchmark.gpu.budget import Budget
 from train.benchmark.gpu.record import Record
 from train.benchmark.gpu.scale import REHEARSAL
-from train.ppo import Point
+from train.learning.curve import Point
 
 
 @pytest.fixture

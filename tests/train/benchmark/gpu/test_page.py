@@ -5,7 +5,7 @@ import pytest
 from PIL import Image
 
 from mjx_hand.errors import InputError
-from mjx_hand.view import plots
+from mjx_hand.view.figures import plots
 from train.benchmark.gpu.page import Pages, markdown, shown, text
 from train.benchmark.gpu.record import Record, Table
 

@@ -1,0 +1,1 @@
+"""Demonstrations by scripted grasps in the engine, captured as a laboratory would."""

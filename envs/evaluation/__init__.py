@@ -1,0 +1,1 @@
+"""Rollouts of a policy, and what they score."""

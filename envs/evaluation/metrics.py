@@ -1,0 +1,173 @@
+"""The field's metrics, one function each over `Rollouts`; frames that are not counted never matter.
+
+Success metrics give one bool a rollout, errors one number. Thresholds are passed by what is strictly below them.
+Sources: ManipTrans (Li et al. 2025, https://arxiv.org/abs/2503.21860), SPIDER (Pan et al. 2025,
+https://arxiv.org/abs/2511.09484), CHORD as FlashCHORD scores it, ADD-AUC (Xiang et al. 2018,
+https://arxiv.org/abs/1711.00199, with the thresholds used for dexterous tracking).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from envs.evaluation.rollout import Rollouts
+from mjx_hand.errors import InputError
+from mjx_hand.objects.description import ObjectDescription
+from mjx_hand.objects.surface_points import surface_points
+
+MANIP_TRANS = {"rotation": np.deg2rad(30.0), "translation": 0.03, "joints": 0.08, "tips": 0.06}  # rad, m
+SPIDER = {"rotation": 0.5, "translation": 0.10}
+CHORD = {"rotation": 0.5, "translation": 0.10, "wrist": 0.15}
+ADD_THRESHOLDS = np.arange(1, 10) / 100  # m
+ADD_POINTS = 500
+HOLD_SECONDS, HOLD_SLIP = 5.0, 0.02
+RAISED = 0.02  # m above its start from which an object counts as lifted
+
+_WRIST, _INDEX_KNUCKLE, _PINKY_KNUCKLE = 0, 1, 7  # three points of the palm, in the order of `hand.joints.LINKS`
+
+
+def position_error(rollouts: Rollouts) -> Float[np.ndarray, "n t"]:
+    """Distance (m) of the object's centre from the demonstrated one, frame by frame."""
+    return np.linalg.norm(rollouts.object_pose[..., :3] - rollouts.object_reference[..., :3], axis=-1)
+
+
+def rotation_error(rollouts: Rollouts) -> Float[np.ndarray, "n t"]:
+    """Angle (rad) between the object's orientation and the demonstrated one, frame by frame."""
+    a, b = rollouts.object_pose[..., 3:], rollouts.object_reference[..., 3:]
+    apart, together = np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1)
+    # q and -q are one rotation. The arc tangent keeps its accuracy near zero; an arc cosine loses half the digits.
+    return 4 * np.arctan2(np.minimum(apart, together), np.maximum(apart, together))
+
+
+def joint_error(rollouts: Rollouts) -> Float[np.ndarray, "n t"]:
+    """Mean distance (m) of the 16 joint centres from the demonstrated ones, frame by frame."""
+    return np.linalg.norm(rollouts.joints - rollouts.joints_reference, axis=-1).mean(axis=-1)
+
+
+def tip_error(rollouts: Rollouts) -> Float[np.ndarray, "n t"]:
+    """Mean distance (m) of the 5 finger tips from the demonstrated ones, frame by frame."""
+    return np.linalg.norm(rollouts.tips - rollouts.tips_reference, axis=-1).mean(axis=-1)
+
+
+def over_counted(values: Float[np.ndarray, "n t"], rollouts: Rollouts) -> Float[np.ndarray, "n"]:
+    """Mean over each rollout's counted frames."""
+    return np.where(rollouts.counted, values, 0.0).sum(axis=1) / rollouts.counted.sum(axis=1)
+
+
+def tracking_error(rollouts: Rollouts) -> Float[np.ndarray, "n"]:
+    """Mean object position error (cm). Its mean over all rollouts, failed ones too, is the paper's tracking error."""
+    return 100 * over_counted(position_error(rollouts), rollouts)
+
+
+def manip_trans_object(rollouts: Rollouts) -> Bool[np.ndarray, "n"]:
+    """ManipTrans, the object's part: mean rotation error < 30 degrees and mean translation error < 3 cm."""
+    turned = over_counted(rotation_error(rollouts), rollouts) < MANIP_TRANS["rotation"]
+    return turned & (over_counted(position_error(rollouts), rollouts) < MANIP_TRANS["translation"])
+
+
+def manip_trans_full(rollouts: Rollouts) -> Bool[np.ndarray, "n"]:
+    """ManipTrans: the object's part, mean joint error < 8 cm and mean finger tip error < 6 cm."""
+    joints = over_counted(joint_error(rollouts), rollouts) < MANIP_TRANS["joints"]
+    tips = over_counted(tip_error(rollouts), rollouts) < MANIP_TRANS["tips"]
+    return manip_trans_object(rollouts) & joints & tips
+
+
+def spider(rollouts: Rollouts) -> Bool[np.ndarray, "n"]:
+    """SPIDER: mean object position error < 10 cm and mean rotation error < 0.5 rad."""
+    turned = over_counted(rotation_error(rollouts), rollouts) < SPIDER["rotation"]
+    return turned & (over_counted(position_error(rollouts), rollouts) < SPIDER["translation"])
+
+
+def chord(rollouts: Rollouts) -> Bool[np.ndarray, "n"]:
+    """CHORD: no counted frame reaches 10 cm or 0.5 rad of object error, or 15 cm of wrist error."""
+    wrist = np.linalg.norm(rollouts.joints[:, :, _WRIST] - rollouts.joints_reference[:, :, _WRIST], axis=-1)
+    good = (position_error(rollouts) < CHORD["translation"]) & (rotation_error(rollouts) < CHORD["rotation"])
+    return (good & (wrist < CHORD["wrist"]) | ~rollouts.counted).all(axis=1)
+
+
+def add_auc(rollouts: Rollouts, objects: Sequence[ObjectDescription]) -> Float[np.ndarray, "n"]:
+    """Area (0 to 1) under the share of counted frames whose ADD is below a threshold, for thresholds 1, 2, ... 9 cm.
+
+    ADD is the mean distance of 500 points of the object's surface from where the demonstration has them; the area is by
+    the trapezoid rule, divided by its width.
+
+    Args:
+        rollouts: n rollouts.
+        objects: each demonstration's object, by the numbers in `rollouts.demonstration`.
+    """
+    area = np.zeros(len(rollouts.demonstration))
+    points = [surface_points(thing, ADD_POINTS) for thing in objects]
+    for row, which in enumerate(rollouts.demonstration):
+        frames = rollouts.counted[row]
+        achieved = _placed(points[which], rollouts.object_pose[row, frames])
+        reference = _placed(points[which], rollouts.object_reference[row, frames])
+        add = np.linalg.norm(achieved - reference, axis=-1).mean(axis=-1)
+        share = (add[:, None] < ADD_THRESHOLDS).mean(axis=0)
+        area[row] = np.trapezoid(share, dx=1 / (len(ADD_THRESHOLDS) - 1))
+    return area
+
+
+def hold(rollouts: Rollouts) -> Bool[np.ndarray, "n"]:
+    """Whether the object stays in the hand for 5 s after the demonstration, while the last target is held on.
+
+    In all of these frames the object's centre, seen from the palm, is less than 2 cm from where it was in the last
+    counted frame. Where the demonstration ends with the object raised (2 cm above its start), the object must also end
+    raised, by at least half as much: one that still lies on the table under a hand at rest has not slipped either.
+
+    Raises:
+        InputError: a rollout has less than 5 s of `held` frames.
+    """
+    needed = round(HOLD_SECONDS * rollouts.fps)
+    fewest = int(rollouts.held.sum(axis=1).min())
+    if fewest < needed:
+        raise InputError(
+            f"rollouts go on for {fewest / rollouts.fps:.2f} s after the demonstration; "
+            f"hold needs {HOLD_SECONDS:g} s, so roll out that much longer"
+        )
+    rows, end = np.arange(len(rollouts.held)), last_counted(rollouts)
+    place = _seen_from_palm(rollouts)
+    judged = rollouts.held & (np.cumsum(rollouts.held, axis=1) <= needed)
+    slip = np.linalg.norm(place - place[rows, end][:, None], axis=-1)
+    kept = ((slip < HOLD_SLIP) | ~judged).all(axis=1)
+    last = rollouts.held.shape[1] - 1 - np.argmax(judged[:, ::-1], axis=1)
+    demonstrated = final_rise(rollouts)
+    raised = rises(rollouts, rollouts.object_pose)[rows, last] >= demonstrated / 2
+    return kept & (raised | (demonstrated < RAISED))
+
+
+def final_rise(rollouts: Rollouts) -> Float[np.ndarray, "n"]:
+    """How far (m) above its start each demonstration leaves the object; from `RAISED` on there is something to hold."""
+    rise = rises(rollouts, rollouts.object_reference)
+    return rise[np.arange(len(rise)), last_counted(rollouts)]
+
+
+def last_counted(rollouts: Rollouts) -> np.ndarray:
+    """Index of each rollout's last counted frame."""
+    return rollouts.counted.shape[1] - 1 - np.argmax(rollouts.counted[:, ::-1], axis=1)
+
+
+def rises(rollouts: Rollouts, pose: Float[np.ndarray, "n t 7"]) -> Float[np.ndarray, "n t"]:
+    """Height (m) above the pose of each rollout's first counted frame."""
+    first = np.argmax(rollouts.counted, axis=1)
+    return pose[..., 2] - pose[np.arange(len(pose)), first, 2][:, None]
+
+
+def _placed(points: Float[np.ndarray, "v 3"], pose: Float[np.ndarray, "t 7"]) -> Float[np.ndarray, "t v 3"]:
+    w, axis = pose[:, None, 3:4], np.broadcast_to(pose[:, None, 4:], (len(pose), len(points), 3))
+    cross = 2 * np.cross(axis, points)
+    return points + w * cross + np.cross(axis, cross) + pose[:, None, :3]
+
+
+def _seen_from_palm(rollouts: Rollouts) -> Float[np.ndarray, "n t 3"]:
+    """The object's centre in a frame fixed to the palm, which wrist and two knuckles span."""
+    rows, end = np.arange(len(rollouts.counted)), last_counted(rollouts)
+    used = (rollouts.counted | rollouts.held)[..., None, None]
+    joints = np.where(used, rollouts.joints, rollouts.joints[rows, end][:, None])  # padding may be zeros: no frame
+    wrist = joints[:, :, _WRIST]
+    along = joints[:, :, _INDEX_KNUCKLE] - wrist
+    x = along / np.linalg.norm(along, axis=-1, keepdims=True)
+    normal = np.cross(x, joints[:, :, _PINKY_KNUCKLE] - wrist)
+    z = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+    palm = np.stack([x, np.cross(z, x), z], axis=-2)
+    return np.einsum("ntij,ntj->nti", palm, rollouts.object_pose[..., :3] - wrist)

@@ -1,0 +1,101 @@
+"""Rolling a twin out: every demonstration from its first frame, unassisted, to its end and beyond."""
+
+from collections.abc import Callable, Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from envs.evaluation.rollout import Rollouts
+from envs.observation import wrist_rotation
+from envs.scene import NUM_WRIST
+from envs.tracking import Tables, TrackingEnv, twin_of
+from mjx_hand.hand.joints import NUM_HINGES
+from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics, stack_hands, tip_positions
+
+_NUM_TARGETS = NUM_WRIST + NUM_HINGES
+
+
+def zero_residual(parameters: object, observation: Float[Array, "n o"]) -> Float[Array, "n 26"]:
+    """The policy that leaves the reference as it is: the baseline."""
+    return jnp.zeros((observation.shape[0], _NUM_TARGETS))
+
+
+def make_roll_out(
+    env: TrackingEnv,
+    hands: Sequence[RigidHand],
+    policy: Callable[[object, Array], Array],
+    hold: float = 0.0,
+    repeats: int = 1,
+) -> Callable[[object], Rollouts]:
+    """A function from a policy's parameters to the rollouts of every demonstration of `env`; compiled once.
+
+    Nothing ends a rollout early: a dropped object counts in every frame after it. All rollouts run side by side.
+
+    Args:
+        env: the environment.
+        hands: the twin's hand for each demonstration.
+        policy: from (parameters, observations of all worlds) to actions.
+        hold: how long the last target is held on after each demonstration (s).
+        repeats: rollouts of each demonstration, one set after the other. They differ where an engine adds forces up in
+            an order that it does not keep, as on a GPU; the native engine's are the same to the last bit.
+    """
+    which = np.tile(np.arange(env.num_demonstrations), repeats)
+    length = np.asarray(env.reference.length)[which]
+    steps = int(length.max()) - 1 + round(hold * env.fps)
+
+    @jax.jit
+    def run(parameters: object, tables: Tables) -> tuple[Array, Array, Array]:
+        given = env.with_tables(tables)
+
+        def step(state, _):  # type: ignore[no-untyped-def]
+            state = jax.vmap(given.step)(state, policy(parameters, state.obs))
+            physics = twin_of(state).physics
+            return state, (physics.qpos, physics.sensordata, state.reward)
+
+        first = jax.vmap(given.start)(jnp.asarray(which, jnp.int32), jnp.zeros(len(which), jnp.int32))
+        physics = twin_of(first).physics
+        start = (physics.qpos, physics.sensordata, first.reward)
+        _, rest = jax.lax.scan(step, first, length=steps)
+        return jax.tree.map(lambda a, b: jnp.moveaxis(jnp.concatenate([a[None], b]), 0, 1), start, rest)
+
+    @jax.jit
+    def centres(qpos: Float[Array, "n t q"], base: Float[Array, "n 3 3"], bodies: RigidHand) -> tuple[Array, Array]:
+        def one(q: Array, base: Array, hand: RigidHand) -> tuple[Array, Array]:
+            rotation = wrist_rotation(q[3:NUM_WRIST], base)
+            rot, pos = forward_kinematics(q[NUM_WRIST:_NUM_TARGETS], hand)
+            tips = tip_positions(rot, pos, hand)
+            return pos @ rotation.T + base @ q[:3], tips @ rotation.T + base @ q[:3]
+
+        return jax.vmap(lambda qs, b, h: jax.lax.map(lambda q: one(q, b, h), qs, batch_size=64))(qpos, base, bodies)
+
+    # After a demonstration its last frame is the reference.
+    frame = np.minimum(np.arange(steps + 1)[None], length[:, None] - 1)
+    reference = np.asarray(env.reference.targets)[which[:, None], frame]
+    pose = np.asarray(env.reference.object_pose)[which[:, None], frame]
+    base, bodies = env.reference.base[which], jax.tree.map(lambda leaf: leaf[which], stack_hands(hands))
+    wanted_joints, wanted_tips = (np.asarray(a) for a in centres(reference, base, bodies))
+    time = np.arange(steps + 1)[None]
+    counted = time < length[:, None]
+    held = (time >= length[:, None]) & (time < length[:, None] + round(hold * env.fps))
+
+    def roll_out(parameters: object) -> Rollouts:
+        qpos, sensors, reward = run(parameters, env.tables)
+        joints, _ = centres(qpos[..., :_NUM_TARGETS], base, bodies)
+        return Rollouts(
+            demonstration=which,
+            qpos=np.asarray(qpos),
+            object_pose=np.asarray(qpos[..., _NUM_TARGETS:]),
+            object_reference=pose,
+            joints=np.asarray(joints),
+            joints_reference=wanted_joints,
+            tips=np.asarray(sensors).reshape(*sensors.shape[:2], 5, 3),
+            tips_reference=wanted_tips,
+            counted=counted,
+            held=held,
+            reward=np.asarray(reward),
+            fps=env.fps,
+        )
+
+    return roll_out

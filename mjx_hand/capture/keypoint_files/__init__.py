@@ -1,0 +1,1 @@
+"""Forms of keypoint files, one a module."""

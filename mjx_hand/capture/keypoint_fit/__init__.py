@@ -1,0 +1,1 @@
+"""Shape, wrist and rotations from keypoints."""

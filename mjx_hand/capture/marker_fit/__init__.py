@@ -1,0 +1,1 @@
+"""The hand's pose, wrist, shape and skin offsets from markers."""

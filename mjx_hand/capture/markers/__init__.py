@@ -1,0 +1,1 @@
+"""Marker recordings and marker sets: labels, places on the hand, gaps, outliers."""

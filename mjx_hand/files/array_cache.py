@@ -1,0 +1,93 @@
+"""Arrays that take seconds to compute, kept beside compiled functions from one start of a program to the next."""
+
+import contextlib
+import functools
+import hashlib
+import os
+from collections.abc import Callable, Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import jax
+import mujoco
+import numpy as np
+
+from mjx_hand.errors import InputError
+from mjx_hand.files.npz_archive import load_arrays, save_arrays
+
+SCHEMA = "mjx-hand/kept/1"
+_FOLDER = "arrays"
+_MOST = 60  # files; those that were used longest ago are deleted
+_CODE = tuple(Path(__file__).parents[2] / name for name in ("mjx_hand", "envs"))  # all: what matters is easily missed
+_LIBRARIES = ("jax", "jaxlib", "mujoco", "numpy", "scipy")
+
+
+def kept(compute: Callable[[], Mapping[str, np.ndarray]], *ingredients: Any) -> Mapping[str, np.ndarray]:
+    """What `compute` gives, or gave in an earlier start with the same ingredients, code and libraries.
+
+    They are kept where `mjx_hand.compile_cache` keeps compiled functions, if it does; that folder is safe to delete.
+
+    Args:
+        compute: a function of the ingredients alone.
+        ingredients: pytrees of arrays, numbers, strings and bytes.
+
+    Raises:
+        InputError: they cannot be written.
+    """
+    cache = _cache()
+    if cache is None:
+        return compute()
+    path = Path(cache) / _FOLDER / f"{_digest(ingredients)}.npz"
+    if path.is_file():
+        try:
+            arrays = load_arrays(path, SCHEMA)
+        except InputError:  # damaged, as an archive's checksums tell: it is made anew
+            pass
+        else:
+            with contextlib.suppress(OSError):  # another's cache, or one that was deleted this moment
+                os.utime(path)
+            return arrays
+    arrays = compute()
+    save_arrays(path, SCHEMA, arrays)
+    with contextlib.suppress(FileNotFoundError):  # another process tidies up too
+        for old in sorted(path.parent.glob("[!.]*.npz"), key=lambda file: file.stat().st_mtime)[:-_MOST]:
+            old.unlink()
+    return arrays
+
+
+def _cache() -> str | None:
+    """Where JAX keeps what it compiles, if it does."""
+    return jax.config.values["jax_compilation_cache_dir"]
+
+
+def model_bytes(model: mujoco.MjModel) -> bytes:
+    """All of a model, as an ingredient of what is kept."""
+    content = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, content)
+    return content.tobytes()
+
+
+@functools.cache
+def _code() -> bytes:
+    """A digest of the code as this process found it."""
+    content = hashlib.sha256()
+    for root in _CODE:
+        for source in sorted(root.rglob("*.py")):
+            content.update(str(source.relative_to(root)).encode())
+            content.update(source.read_bytes())
+    return content.digest()
+
+
+def _digest(ingredients: Any) -> str:
+    content = hashlib.sha256()
+    for library in _LIBRARIES:
+        content.update(f"{library} {version(library)} ".encode())
+    content.update(_code())
+    leaves, structure = jax.tree.flatten(ingredients)
+    content.update(f"{jax.default_backend()} {structure}".encode())
+    for leaf in leaves:
+        value = np.frombuffer(leaf, np.uint8) if isinstance(leaf, bytes) else np.asarray(leaf)
+        content.update(f"{value.dtype} {value.shape}".encode())
+        content.update(value.tobytes())
+    return content.hexdigest()

@@ -1,0 +1,1 @@
+"""Objects that hands hold: descriptions, distances, surface points, convex pieces."""

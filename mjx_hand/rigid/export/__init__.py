@@ -1,0 +1,1 @@
+"""Descriptions of the rigid hand for simulators: MJCF, URDF and their meshes."""

@@ -1,0 +1,1 @@
+"""The hand's skin cut into links: borders along smooth curves, domes that close them."""

@@ -1,0 +1,163 @@
+"""`RobotHand`: which links of a robot hand follow which keypoints, read from a small YAML file.
+
+Descriptions that come with the project are `mjx_hand/robots/descriptions/NAME.yaml`, one file a hand; a path to another
+file serves as well. The URDF is the user's own.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from mjx_hand.capture.keypoints.layouts import KEYPOINTS
+from mjx_hand.errors import InputError
+from mjx_hand.robots.robot_urdf import robot_tree
+from mjx_hand.robots.solver.kinematic_tree import BASE, KinematicTree
+from mjx_hand.robots.solver.objectives import KINDS, Objective, dexpilot_pairs
+
+ROBOTS = Path(__file__).parent / "descriptions"
+_NEEDED = ("palm", "tips", "scaling", "fingers", "palmar")
+_KNOWN = (*_NEEDED, "joints", "vectors")
+
+
+@dataclass(frozen=True)
+class RobotHand:
+    """A robot hand's description.
+
+    Attributes:
+        name: of the file.
+        palm: the link at which the person's wrist is.
+        tips: finger-tip links and the keypoints that they follow, the thumb's first.
+        joints: further links and their keypoints.
+        all_vectors: whether the objective `vector` follows `joints` too, not only `tips`.
+        scaling: the robot's size over a person's.
+        fingers, palmar: directions in the frame of the URDF's root link, unit and at right angles: where straight
+            fingers point, and out of the palm.
+    """
+
+    name: str
+    palm: str
+    tips: dict[str, str]
+    joints: dict[str, str]
+    all_vectors: bool
+    scaling: float
+    fingers: np.ndarray
+    palmar: np.ndarray
+
+
+def known_robots() -> tuple[str, ...]:
+    """The names of the descriptions that come with the project."""
+    return tuple(sorted(path.stem for path in ROBOTS.glob("*.yaml")))
+
+
+def load_robot(robot: str | Path) -> RobotHand:
+    """A description by its name, or from a file.
+
+    Raises:
+        InputError: neither, or the description is incomplete.
+    """
+    path = ROBOTS / f"{robot}.yaml" if str(robot) in known_robots() else Path(robot)
+    if not path.is_file():
+        raise InputError(f"robot is {str(robot)!r}; valid: {', '.join(known_robots())}, or the path of a description")
+    try:
+        content = yaml.safe_load(path.read_text())
+    except (yaml.YAMLError, UnicodeDecodeError, OSError) as error:
+        raise InputError(f"{path}: not YAML that can be read ({str(error).splitlines()[0]})") from None
+    return _checked(path, content)
+
+
+def _checked(path: Path, content: Any) -> RobotHand:
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: not a description; it needs {', '.join(_NEEDED)}")
+    if missing := [name for name in _NEEDED if name not in content]:
+        raise InputError(f"{path}: has no {missing[0]!r}; it needs {', '.join(_NEEDED)}")
+    if unknown := [str(name) for name in content if name not in _KNOWN]:
+        raise InputError(f"{path}: {unknown[0]!r} is not known; valid: {', '.join(_KNOWN)}")
+    follows = {}
+    for name in ("tips", "joints"):
+        links = content.get(name, {})
+        if not isinstance(links, dict) or any(keypoint not in KEYPOINTS for keypoint in links.values()):
+            raise InputError(f"{path}: {name} must give links their keypoints, of {', '.join(KEYPOINTS)}")
+        follows[name] = {str(link): str(keypoint) for link, keypoint in links.items()}
+    if len(follows["tips"]) < 2 or not next(iter(follows["tips"].values())).startswith("thumb"):
+        raise InputError(f"{path}: tips must name two links or more, the thumb's first")
+    if not isinstance(content["palm"], str):
+        raise InputError(f"{path}: palm is {content['palm']!r}; give a link's name")
+    vectors = content.get("vectors", "tips")
+    if vectors not in ("tips", "all"):
+        raise InputError(f"{path}: vectors is {vectors!r}; valid: tips, all")
+    scaling = content["scaling"]
+    if not isinstance(scaling, int | float) or not 0 < scaling < np.inf:
+        raise InputError(f"{path}: scaling is {scaling!r}; give a positive number")
+    fingers, palmar = (_direction(path, name, content[name]) for name in ("fingers", "palmar"))
+    if abs(fingers @ palmar) > 1e-3:
+        raise InputError(f"{path}: fingers and palmar must be at right angles; their cosine is {fingers @ palmar:.3f}")
+    return RobotHand(
+        name=path.stem,
+        palm=content["palm"],
+        tips=follows["tips"],
+        joints=follows["joints"],
+        all_vectors=vectors == "all",
+        scaling=float(scaling),
+        fingers=fingers,
+        palmar=palmar,
+    )
+
+
+def _direction(path: Path, name: str, value: Any) -> np.ndarray:
+    try:
+        vector = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        vector = np.zeros(0)
+    if vector.shape != (3,) or not np.isfinite(vector).all() or np.linalg.norm(vector) < 1e-6:
+        raise InputError(f"{path}: {name} is {value!r}; give a direction of three numbers")
+    return vector / np.linalg.norm(vector)
+
+
+def robot_objective(robot: RobotHand, urdf: str | Path, kind: str = "vector") -> tuple[KinematicTree, Objective]:
+    """A robot hand's tree and what it is asked to do.
+
+    Args:
+        robot: its description.
+        urdf: its URDF; meshes are not needed.
+        kind: a name in `objectives.KINDS`. `position` moves the base too and does not scale.
+
+    Raises:
+        InputError: unknown kind, or see `robot_tree`.
+    """
+    if kind not in KINDS:
+        raise InputError(f"objective is {kind!r}; valid: {', '.join(KINDS)}")
+    follows = robot.tips if kind == "dexpilot" or (kind == "vector" and not robot.all_vectors) else _all(robot)
+    numbers = tuple(KEYPOINTS.index(keypoint) for keypoint in follows.values())
+    if kind == "position":
+        count = len(follows)
+        pairs = ((BASE,) * count, tuple(range(count)), (BASE,) * count, numbers)
+        return robot_tree(urdf, list(follows)), _objective(kind, 1.0, pairs)
+    tree = robot_tree(urdf, [robot.palm, *follows])
+    if kind == "vector":
+        count = len(follows)
+        pairs = ((0,) * count, tuple(range(1, count + 1)), (KEYPOINTS.index("wrist"),) * count, numbers)
+        return tree, _objective(kind, robot.scaling, pairs)
+    human = (KEYPOINTS.index("wrist"), *numbers)
+    origins, tasks = dexpilot_pairs(len(follows))
+    pairs = (origins, tasks, tuple(human[k] for k in origins), tuple(human[k] for k in tasks))
+    return tree, _objective(kind, robot.scaling, pairs)
+
+
+def _all(robot: RobotHand) -> dict[str, str]:
+    return {**robot.tips, **robot.joints}
+
+
+def _objective(kind: str, scaling: float, pairs: tuple[tuple[int, ...], ...]) -> Objective:
+    origins, tasks, human_origins, human_tasks = pairs
+    return Objective(
+        scaling=scaling,
+        kind=kind,
+        origins=origins,
+        tasks=tasks,
+        human_origins=human_origins,
+        human_tasks=human_tasks,
+        free_base=kind == "position",
+    )

@@ -1,0 +1,1 @@
+"""The optimiser of keypoint retargeting: kinematic trees, objectives, projected Newton steps."""

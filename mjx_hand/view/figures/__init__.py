@@ -1,0 +1,1 @@
+"""Figures of errors, fits, skins and learning curves."""

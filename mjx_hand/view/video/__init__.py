@@ -1,0 +1,1 @@
+"""Scenes as videos and pictures, rendered off screen."""

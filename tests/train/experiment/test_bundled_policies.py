@@ -1,0 +1,67 @@
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import train.experiment.bundled_policies
+from envs.evaluation.evaluate import evaluate
+from envs.evaluation.roll_out import make_roll_out, zero_residual
+from mjx_hand.errors import InputError
+from tools import bundle_policy
+from train.experiment.bundled_policies import included_policy, included_world
+from train.experiment.setup import chosen_checkpoint
+from train.learning.checkpoint import load_checkpoint
+from train.learning.curve import Point
+from train.learning.policy import deterministic_policy
+from train.play import viewer
+from train.reports.results_table import FIVE
+from train.settings.config import Config, compose
+from train.settings.options import Play
+
+Trained = tuple[Path, list[Point]]
+
+
+@pytest.fixture
+def untrained(tiny: Config, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Config:
+    """An experiment without a training of its own; nothing is included yet."""
+    monkeypatch.setattr(train.experiment.bundled_policies, "FOLDER", tmp_path / "included")
+    return dataclasses.replace(tiny, out=str(tmp_path / "nothing"), play=Play(port=0))
+
+
+def test_what_is_included_is_played_where_nothing_was_trained(
+    trained: Trained, tiny: Config, untrained: Config, capsys: pytest.CaptureFixture[str]
+):
+    bundle_policy.main(tiny)
+    capsys.readouterr()
+    shown = viewer(untrained)
+    shown.close()
+    assert "playing the policy that comes with mjx-hand" in capsys.readouterr().out
+    assert shown.scene.title.startswith("tiny 0: ")
+    kept, best = load_checkpoint(included_policy("tiny") or ""), load_checkpoint(trained[0] / "best.npz")
+    for layer in ("hidden_0", "mean_kernel"):
+        if layer in best.policy["params"]:
+            found, wanted = (c.policy["params"][layer]["kernel"] for c in (kept, best))
+            np.testing.assert_array_equal(found, wanted)
+    assert (kept.value, kept.steps) == ({}, best.steps)
+
+
+def test_without_one_the_command_that_trains_is_named(untrained: Config):
+    with pytest.raises(InputError, match=r"no such checkpoint; train one first: python -m train\.ppo"):
+        viewer(untrained)
+
+
+@pytest.mark.parametrize("name", [*FIVE, "all"])
+def test_the_policies_that_come_along_do_what_the_zero_residual_does_not(name: str):
+    """On the demonstration beside each, from frame 0, and still there five seconds later."""
+    config = compose([f"config={name}", "engine=native"])
+    config = dataclasses.replace(config, checkpoint=str(included_policy(name)))
+    world = included_world(config)
+    checkpoint = chosen_checkpoint(config, world.env.observation_size)
+    policy = deterministic_policy(config.ppo, world.env.observation_size, world.env.action_size)
+    objects = [d.object for d in world.demonstrations]
+    scores = evaluate(make_roll_out(world.env, world.hands, policy, 5.0)(checkpoint.policy), objects).rows()
+    assert scores["manip_trans_object"] == scores["hold"] == 1
+    assert scores["tracking_error_cm"] < 0.5
+    idle = evaluate(make_roll_out(world.env, world.hands, zero_residual)(None), objects).rows()
+    assert idle["tracking_error_cm"] > 2 * scores["tracking_error_cm"]

@@ -1,0 +1,163 @@
+"""Trainings that are stopped, killed and damaged end as those that are not."""
+
+import contextlib
+import dataclasses
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import train.ppo
+from mjx_hand.errors import InputError
+from tests.train.commands import arguments
+from train.experiment.setup import World
+from train.learning.curve import Point
+from train.learning.interruption import interruptions
+from train.ppo import train as run
+from train.settings.config import Config
+
+Trained = tuple[Path, list[Point]]
+
+
+def in_folder(config: Config, out: Path, **change: Any) -> Config:
+    return dataclasses.replace(config, out=str(out), **change)
+
+
+def shortened(config: Config, steps: int) -> Config:
+    return dataclasses.replace(config, ppo=dataclasses.replace(config.ppo, num_timesteps=steps))
+
+
+def same_results(one: Path, other: Path) -> None:
+    for name in ("best.npz", "last.npz"):
+        with np.load(one / name) as first, np.load(other / name) as second:
+            assert set(first) == set(second)
+            for key in first:
+                np.testing.assert_array_equal(second[key], first[key], err_msg=f"{name} {key}")
+    scores = [
+        [line.split(",")[:1] + line.split(",")[2:] for line in (folder / "curve.csv").read_text().splitlines()]
+        for folder in (one, other)
+    ]
+    assert scores[0] == scores[1]
+
+
+def test_a_training_in_two_parts_is_the_training(trained: Trained, tiny: Config, world: World, tmp_path):
+    out, points = trained
+    assert [p.steps for p in run(in_folder(shortened(tiny, 32), tmp_path), world)] == [0, 32]
+    again = run(in_folder(tiny, tmp_path), world)
+    assert [p.steps for p in again] == [p.steps for p in points]
+    same_results(out, tmp_path)
+
+
+def test_a_finished_training_says_so(trained: Trained, tiny: Config, world: World, capsys):
+    out, points = trained
+    before = (out / "last.npz").stat().st_mtime_ns
+    assert [p.steps for p in run(tiny, world)] == [p.steps for p in points]
+    assert "is trained already" in capsys.readouterr().out
+    assert (out / "last.npz").stat().st_mtime_ns == before
+
+
+def test_a_signal_stops_between_updates_and_the_rest_follows(
+    trained: Trained, tiny: Config, world: World, tmp_path, monkeypatch, capsys
+):
+    @contextlib.contextmanager
+    def after_the_first_update() -> Iterator[Callable[[], int]]:
+        calls = iter(range(100))
+        yield lambda: signal.SIGTERM if next(calls) else 0
+
+    config = in_folder(dataclasses.replace(tiny, checks=dataclasses.replace(tiny.checks, every=64)), tmp_path)
+    with monkeypatch.context() as patched:
+        patched.setattr(train.ppo, "interruptions", after_the_first_update)
+        with pytest.raises(SystemExit) as stop:
+            run(config, world)
+    assert stop.value.code == 128 + signal.SIGTERM
+    assert "stopped at 32 steps and saved" in capsys.readouterr().out
+    assert [p.steps for p in run(config, world)] == [0, 64]
+    with np.load(trained[0] / "last.npz") as first, np.load(tmp_path / "last.npz") as second:
+        for key in first:
+            np.testing.assert_array_equal(second[key], first[key])
+
+
+def test_signals_are_remembered_and_the_handlers_put_back():
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    with interruptions() as asked:
+        assert asked() == 0
+        signal.raise_signal(signal.SIGTERM)
+        assert asked() == signal.SIGTERM
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+
+
+def test_other_settings_do_not_go_on_but_start_anew_if_told(tiny: Config, world: World, tmp_path):
+    short = shortened(in_folder(tiny, tmp_path), 32)
+    run(short, world)
+    with pytest.raises(InputError, match=r"holds a training with seed=0, now 1; choose another .* fresh=true"):
+        run(dataclasses.replace(short, seed=1), world)
+    anew = run(dataclasses.replace(short, seed=1, fresh=True), world)
+    assert [p.steps for p in anew] == [0, 32]
+
+
+def test_a_second_training_is_kept_out_and_a_killed_one_keeps_nobody_out(tiny: Config, world: World, tmp_path):
+    config = shortened(in_folder(tiny, tmp_path), 32)
+    code = "import sys, time, filelock; lock = filelock.FileLock(sys.argv[1]); lock.acquire(); print('has it')"
+    command = [sys.executable, "-uc", f"{code}; time.sleep(60)", str(tmp_path / "lock")]
+    other = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    with other:
+        try:
+            assert other.stdout is not None
+            assert other.stdout.readline() == "has it\n"
+            for fresh in (False, True):
+                with pytest.raises(InputError, match=r"another training is under way in .*stop it.*out=FOLDER"):
+                    run(dataclasses.replace(config, fresh=fresh), world)
+            assert [path.name for path in tmp_path.iterdir()] == ["lock"]
+        finally:
+            other.kill()
+    assert [p.steps for p in run(config, world)] == [0, 32]
+
+
+def test_a_damaged_state_is_named_and_the_one_before_used(
+    trained: Trained, tiny: Config, world: World, tmp_path, capsys
+):
+    config = in_folder(tiny, tmp_path)
+    run(config, world)
+    states = sorted((tmp_path / "state").iterdir())
+    assert [path.name for path in states] == ["000000000000.npz", "000000000032.npz", "000000000064.npz"]
+    content = bytearray(states[-1].read_bytes())
+    content[len(content) // 2] ^= 1
+    states[-1].write_bytes(content)
+    capsys.readouterr()
+    run(config, world)
+    said = capsys.readouterr().out
+    assert "damaged, so the state before it is used" in said
+    assert "going on from 32 steps" in said
+    same_results(trained[0], tmp_path)
+    for path in states:
+        path.write_bytes(b"")
+    with pytest.raises(InputError, match=r"no sound state in .*; train anew with fresh=true"):
+        run(config, world)
+
+
+def test_killed_at_once_it_goes_on(trained: Trained, tiny: Config, tmp_path):
+    """SIGKILL, which nothing can catch, as soon as there is a state to go on from."""
+    command = arguments(tiny, tmp_path)
+    with (tmp_path / "log").open("w") as log:
+        process = subprocess.Popen(command, stdout=log, stderr=log)
+        try:
+            for _ in range(3000):
+                if list(tmp_path.glob("state/[0-9]*.npz")) or process.poll() is not None:
+                    break
+                time.sleep(0.1)
+        finally:
+            process.kill()
+            process.wait()
+    assert process.returncode == -signal.SIGKILL, (tmp_path / "log").read_text()
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert "going on from" in done.stdout
+    same_results(trained[0], tmp_path)

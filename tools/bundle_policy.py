@@ -1,0 +1,37 @@
+"""Put an experiment's best policy among those that come with the project.
+
+    python -m tools.bundle_policy config=pinch seed=1
+
+writes it, and its held-out demonstration of median tracking error, into train/policies.
+"""
+
+import dataclasses
+from pathlib import Path
+
+from mjx_hand.motion.demonstration import Demonstration, save_demonstration
+from train.experiment import bundled_policies
+from train.experiment.evaluate_seeds import median_and_worst
+from train.experiment.setup import make_world, rolled_out
+from train.learning.checkpoint import Checkpoint, save_checkpoint
+from train.settings.config import Config, command
+
+
+def include(checkpoint: Checkpoint, demonstration: Demonstration, name: str) -> list[Path]:
+    """Write both files. The value network, which only training needs, is left out."""
+    bundled_policies.FOLDER.mkdir(exist_ok=True)
+    save_checkpoint(dataclasses.replace(checkpoint, value={}), bundled_policies.FOLDER / f"{name}.npz")
+    save_demonstration(demonstration, bundled_policies.demonstration_path(name))
+    return [bundled_policies.FOLDER / f"{name}.npz", bundled_policies.demonstration_path(name)]
+
+
+def main(config: Config) -> None:
+    """Choose the demonstration and write."""
+    world = make_world(config, "heldout")
+    checkpoint, _, scores = rolled_out(config, world)
+    _, median = median_and_worst({config.seed: scores})["median"]
+    for path in include(checkpoint, world.demonstrations[median], config.name):
+        print(f"{path}: {path.stat().st_size / 1000:.0f} kB")
+
+
+if __name__ == "__main__":
+    command(main)

@@ -1,0 +1,1 @@
+"""Builds the open hand from the MakeHuman body (mjx_hand/hand/PROVENANCE.md)."""

@@ -1,0 +1,1 @@
+"""An experiment's environment and policies: made, chosen, rolled out."""

@@ -1,0 +1,109 @@
+"""The policies of several seeds on held-out demonstrations, beside two baselines that do not learn.
+
+The baselines are the same reference with a residual of zero, and the demonstration replayed as it is. They do not
+depend on the seed and are rolled out once; so is everything compiled.
+"""
+
+import dataclasses
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from envs.evaluation.evaluate import Evaluation, evaluate
+from envs.evaluation.roll_out import make_roll_out, zero_residual
+from envs.evaluation.rollout import Rollouts
+from mjx_hand.errors import InputError
+from mjx_hand.progress import counter
+from train.experiment.setup import World, chosen_checkpoint, make_world, without_grip
+from train.learning.checkpoint import Checkpoint
+from train.learning.policy import deterministic_policy
+from train.settings.config import Config
+
+HOLD = 5.0  # s after the demonstration, for the hold metric
+POLICY, ZERO, REPLAY = "policy", "zero residual", "demonstration alone"
+
+
+@dataclasses.dataclass(frozen=True)
+class Results:
+    """Rollouts and their scores, by column title, of one seed's policy and the baselines."""
+
+    world: World
+    checkpoint: Checkpoint
+    rollouts: Mapping[str, Rollouts]
+    evaluations: Mapping[str, Evaluation]
+
+
+def evaluate_seeds(configs: Sequence[Config], part: str = "heldout") -> dict[int, Results]:
+    """Roll out each seed's policy and the baselines on one part of the demonstrations and score them, by seed.
+
+    Args:
+        configs: an experiment with one seed after the other, as `train.settings.config.of_seeds` makes them.
+        part: "heldout" or "train".
+
+    Raises:
+        InputError: a seed without a checkpoint, or with one of another task.
+    """
+    for config in configs:
+        _check_trained(config)
+    world = make_world(configs[0], part)
+    env = world.env
+    checkpoints = {config.seed: chosen_checkpoint(config, env.observation_size) for config in configs}
+    objects = [demonstration.object for demonstration in world.demonstrations]
+    alone = without_grip(world)
+    policy = deterministic_policy(configs[0].ppo, env.observation_size, env.action_size)
+    rollouts: dict[int | str, Rollouts] = {}
+    with counter(len(configs) + 2, "evaluating (sets of rollouts)") as advance:
+        roll_out = make_roll_out(env, world.hands, policy, HOLD)
+        for seed, checkpoint in checkpoints.items():
+            rollouts[seed] = roll_out(checkpoint.policy)
+            advance(1)
+        rollouts[ZERO] = make_roll_out(env, world.hands, zero_residual, HOLD)(None)
+        advance(1)
+        rollouts[REPLAY] = make_roll_out(alone.env, world.hands, zero_residual, HOLD)(None)
+        advance(1)
+    scores = {key: evaluate(each, objects) for key, each in rollouts.items()}
+    keys = {seed: {POLICY: seed, ZERO: ZERO, REPLAY: REPLAY} for seed in checkpoints}
+    return {
+        seed: Results(
+            world,
+            checkpoint,
+            {title: rollouts[key] for title, key in keys[seed].items()},
+            {title: scores[key] for title, key in keys[seed].items()},
+        )
+        for seed, checkpoint in checkpoints.items()
+    }
+
+
+def evaluate_checkpoint(config: Config, part: str = "heldout") -> Results:
+    """The results of one seed, as `evaluate_seeds`."""
+    return evaluate_seeds([config], part)[config.seed]
+
+
+def median_and_worst(evaluations: Mapping[int, Evaluation]) -> dict[str, tuple[int, int]]:
+    """Seed and number of the "median" and the "worst" rollout of several seeds by tracking error.
+
+    A failure is worse than any success, however small its tracking error.
+    """
+    places = [(seed, k) for seed, e in evaluations.items() for k in range(len(e.demonstration))]
+    errors = np.concatenate([e.scores["tracking_error_cm"] for e in evaluations.values()])
+    failed = np.array([bool(reason) for e in evaluations.values() for reason in e.failure])
+    median = np.argsort(errors, kind="stable")[len(errors) // 2]
+    return {"median": places[median], "worst": places[np.lexsort((errors, failed))[-1]]}
+
+
+def shared_folder(configs: Sequence[Config]) -> Path:
+    """Where results of all these seeds go: the seed's own folder, or the one above those of several."""
+    return Path(os.path.commonpath([config.out for config in configs]))
+
+
+def _check_trained(config: Config) -> None:
+    """Refuse a missing checkpoint before the environment is built."""
+    best = Path(config.out) / "best.npz"
+    if not config.checkpoint and not best.is_file():
+        elsewhere = "" if config.out == f"outputs/{config.name}/seed{config.seed}" else f" out={config.out}"
+        raise InputError(
+            f"seed {config.seed} of {config.name!r}: no such checkpoint: {best}; train it first, with the options "
+            f"given here: python -m train.ppo config={config.name} seed={config.seed}{elsewhere}"
+        )

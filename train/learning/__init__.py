@@ -1,0 +1,1 @@
+"""Learning, its states on disk, and what a training survives."""

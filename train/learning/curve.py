@@ -1,0 +1,53 @@
+"""What a training's `curve.csv` tells: its evaluations, and how long it took to learn."""
+
+import csv
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+
+from mjx_hand.errors import InputError
+from train.settings.config import Config
+
+LEARNED = 0.95  # share of training demonstrations from which a policy counts as having learned
+
+
+@dataclasses.dataclass(frozen=True)
+class Point:
+    """One evaluation on the training demonstrations: steps and seconds so far, and scores."""
+
+    steps: int
+    seconds: float
+    success: float
+    tracking_error_cm: float
+    rotation_error_deg: float
+
+
+def load_curve(folder: str | Path) -> list[Point]:
+    """The evaluations of the training in a folder, in order; none where it has not begun.
+
+    Raises:
+        InputError: the file is not one that a training wrote.
+    """
+    path = Path(folder) / "curve.csv"
+    if not path.is_file():
+        return []
+    names = [field.name for field in dataclasses.fields(Point)]
+    try:
+        with path.open() as file:
+            rows = [{name: float(row[name]) for name in names} for row in csv.DictReader(file)]
+        return [Point(**{**row, "steps": int(row["steps"])}) for row in rows]
+    except (KeyError, TypeError, ValueError):
+        raise InputError(f"{path}: not a learning curve; train again, with fresh=true") from None
+
+
+def is_finished(config: Config, points: Sequence[Point]) -> bool:
+    """Whether a training with these evaluations has done all its steps, or reached what it may stop at."""
+    if not points:
+        return False
+    last = config.ppo.budget * config.ppo.steps_per_update
+    return points[-1].steps >= last or points[-1].success >= config.checks.stop_at
+
+
+def minutes_to_learn(points: Sequence[Point], share: float = LEARNED) -> float | None:
+    """Minutes of training until this share of the training demonstrations was first followed; None if never."""
+    return next((point.seconds / 60 for point in points if point.success >= share), None)

@@ -1,0 +1,59 @@
+"""The policy and value networks, and policies as plain functions of their parameters."""
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import flax
+import jax
+from brax.training.agents.ppo import networks
+from jaxtyping import Array, Float
+
+from mjx_hand.errors import InputError
+from train.settings.options import Ppo
+
+
+def network_factory(ppo: Ppo) -> Callable[..., networks.PPONetworks]:
+    """What Brax PPO makes its networks with.
+
+    Actions are normal with a deviation that does not depend on the state and starts small: a residual that begins as
+    loud noise shakes the object out of the hand before anything can be learned from holding it. Their mean starts at
+    next to nothing, so that a learning curve starts at the zero-residual baseline.
+
+    Raises:
+        InputError: a Flax that does not run on this JAX.
+    """
+    _check_flax(jax.__version_info__, flax.__version__)
+    return functools.partial(
+        networks.make_ppo_networks,
+        policy_hidden_layer_sizes=ppo.policy_layers,
+        value_hidden_layer_sizes=ppo.value_layers,
+        distribution_type="normal",
+        noise_std_type="log",
+        init_noise_std=ppo.initial_std,
+        mean_kernel_init_fn=jax.nn.initializers.variance_scaling,
+        mean_kernel_init_kwargs={"scale": 1e-4, "mode": "fan_in", "distribution": "uniform"},
+    )
+
+
+def _check_flax(jax_version: tuple[int, ...], flax_version: str) -> None:
+    """Flax names no upper bound of JAX, so that an installer keeps an old one beside a new JAX."""
+    if jax_version >= (0, 11) and tuple(int(part) for part in flax_version.split(".")[:3]) < (0, 12, 12):
+        raise InputError(
+            f"flax {flax_version} does not run on jax {'.'.join(map(str, jax_version))}, which needs flax 0.12.12 or "
+            "newer; install it with: pip install --upgrade flax"
+        )
+
+
+def deterministic_policy(
+    ppo: Ppo, observation_size: int, action_size: int
+) -> Callable[[Any, Float[Array, "n o"]], Float[Array, "n 26"]]:
+    """The policy's mean action as a function of (policy parameters, observations)."""
+    made = network_factory(ppo)(observation_size, action_size)
+    infer = networks.make_inference_fn(made)
+
+    def act(parameters: Any, observation: Float[Array, "n o"]) -> Float[Array, "n 26"]:
+        # Observations are scaled by hand, so Brax's normaliser has nothing to say.
+        return infer((None, parameters, None), deterministic=True)(observation, jax.random.key(0))[0]
+
+    return act

@@ -1,0 +1,102 @@
+"""The whole state of a training on disk, so that it goes on as if it had never been stopped.
+
+`out/state/STEPS.npz` (schema mjx-hand/run/1) holds every array of the learner and the evaluations so far. The last few
+are kept, each with a digest of its contents: a damaged one is named and the one before it used.
+"""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+from mjx_hand.errors import InputError
+from mjx_hand.files.npz_archive import load_arrays, save_arrays
+
+SCHEMA = "mjx-hand/run/1"
+KEPT = 3
+
+
+def save_run(folder: Path, steps: int, state: Any, notes: Mapping[str, Any]) -> Path:
+    """Write the state after so many steps, and delete all but the last few.
+
+    Args:
+        folder: of the states; made if absent.
+        steps: names the file.
+        state: a pytree of arrays that this process can read.
+        notes: anything else, as JSON has it.
+
+    Raises:
+        InputError: it cannot be written; the states before it stay.
+    """
+    arrays = {f"state{name}": leaf for name, leaf in _named(state)} | {"notes": np.array(json.dumps(notes))}
+    path = folder / f"{steps:012d}.npz"
+    save_arrays(path, SCHEMA, arrays | {"digest": _digest(arrays)})
+    for old in _files(folder)[KEPT:]:
+        old.unlink(missing_ok=True)
+    return path
+
+
+def load_run(folder: Path, template: Any) -> tuple[Any, dict[str, Any]] | None:
+    """State and notes of the newest sound file, or None where there is none yet.
+
+    Args:
+        folder: of the states.
+        template: a pytree of the same structure, with shapes and types.
+
+    Raises:
+        InputError: files are there and none is sound, or the state is of another structure than the template.
+    """
+    faults = []
+    for path in _files(folder):
+        try:
+            arrays = load_arrays(path, SCHEMA)
+            digest = str(arrays.pop("digest", ""))
+            if digest != _digest(arrays):
+                raise InputError(f"{path}: its contents do not match its digest")
+        except InputError as error:
+            faults.append(str(error))
+            print(f"damaged, so the state before it is used: {error}", flush=True)
+            continue
+        return _filled(path, template, arrays), json.loads(str(arrays["notes"]))
+    if faults:
+        raise InputError(f"no sound state in {folder} ({faults[0]}); train anew with fresh=true")
+    return None
+
+
+def _files(folder: Path) -> list[Path]:
+    """Newest first; files that are still being written begin with a dot."""
+    return sorted((path for path in folder.glob("[0-9]*.npz")), reverse=True)
+
+
+def _named(tree: Any) -> list[tuple[str, np.ndarray]]:
+    leaves, _ = jax.tree_util.tree_flatten_with_path(tree)
+    return [(jax.tree_util.keystr(path), np.asarray(leaf)) for path, leaf in leaves]
+
+
+def _filled(path: Path, template: Any, arrays: Mapping[str, np.ndarray]) -> Any:
+    leaves, structure = jax.tree_util.tree_flatten_with_path(template)
+    found = []
+    for place, wanted in leaves:
+        name = f"state{jax.tree_util.keystr(place)}"
+        value = arrays.get(name)
+        if value is None or value.shape != wanted.shape or value.dtype != wanted.dtype:
+            has = "nothing" if value is None else f"{value.dtype}{list(value.shape)}"
+            raise InputError(
+                f"{path}: holds {has} for {name}, expected {wanted.dtype}{list(wanted.shape)}; it is of another "
+                "version or task: train anew with fresh=true, or choose another folder with out=FOLDER"
+            )
+        found.append(value)
+    return jax.tree_util.tree_unflatten(structure, found)
+
+
+def _digest(arrays: Mapping[str, np.ndarray]) -> str:
+    content = hashlib.sha256()
+    for name in sorted(arrays):
+        value = np.ascontiguousarray(arrays[name])
+        content.update(f"{name} {value.dtype} {value.shape}".encode())
+        content.update(value.tobytes())
+    return content.hexdigest()

@@ -1,0 +1,129 @@
+"""An evaluation as tables, figures and videos, and the page that holds them."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import jax
+import numpy as np
+from matplotlib.figure import Figure
+
+from envs.evaluation.metrics import position_error
+from mjx_hand.view.figures import plots
+from mjx_hand.view.report import Film, Headline, Plot, Report, Section, Table
+from train.experiment.evaluate_seeds import POLICY, REPLAY, ZERO, Results, median_and_worst
+from train.reports.machine import processor, versions
+from train.reports.published import PAPER
+from train.reports.score_table import demonstration_table, failed_table, failure_table, score_table
+from train.reports.type_table import type_table
+from train.settings.config import Config
+from train.view.video import film
+
+TRACKING = "Distance of the object from where the demonstration has it, on held-out demonstrations."
+
+
+def tables(results: Mapping[int, Results], config: Config) -> tuple[Table, ...]:
+    """Scores with the paper's row beside, and how rollouts failed; of several seeds the mean.
+
+    Where the demonstrations are of several grasp types, then also scores by type.
+    """
+    first = next(iter(results.values()))
+    count = len(first.world.demonstrations)
+    note = (
+        f"{count} held-out demonstrations, every rollout counted, from frame 0, unassisted; "
+        "the paper does not define its success"
+    )
+    columns = {POLICY: [result.evaluations[POLICY] for result in results.values()]}
+    columns |= {title: [first.evaluations[title]] for title in (ZERO, REPLAY)}
+    grasps = _grasps(first)
+    by_type = [type_table(columns, grasps)] if len(set(grasps)) > 1 else []
+    return score_table(columns, PAPER.get(config.data.grasp), note), failure_table(columns), *by_type
+
+
+def tracking_plot(results: Mapping[int, Results]) -> Figure:
+    """Tracking error over time of the policy, all seeds together, and the baselines."""
+    first = next(iter(results.values()))
+    every = [result.rollouts[POLICY] for result in results.values()]
+    together = np.concatenate([100 * position_error(r) for r in every])
+    errors = {POLICY: (together, np.concatenate([r.counted for r in every]))}
+    errors |= {t: (100 * position_error(first.rollouts[t]), first.rollouts[t].counted) for t in (ZERO, REPLAY)}
+    return plots.error_over_time(first.world.env.fps, errors, limit=3.0)
+
+
+def films(results: Mapping[int, Results], folder: Path) -> dict[str, Film]:
+    """Videos `worst.mp4` and `median.mp4` in the folder, of all seeds' rollouts."""
+    chosen = median_and_worst({seed: result.evaluations[POLICY] for seed, result in results.items()})
+    made = {}
+    for name in ("worst", "median"):
+        seed, index = chosen[name]
+        result = results[seed]
+        scores, reason = result.evaluations[POLICY].scores, result.evaluations[POLICY].failure[index]
+        caption = (
+            f"The {name} rollout: seed {seed}, demonstration {int(result.rollouts[POLICY].demonstration[index])}, "
+            f"{reason or 'followed'}, {scores['tracking_error_cm'][index]:.2f} cm and "
+            f"{scores['object_rotation_error_deg'][index]:.1f}° off on average."
+        )
+        made[name] = film(result.world, result.rollouts[POLICY], index, folder / f"{name}.mp4", caption)
+    return made
+
+
+def evaluation_page(results: Mapping[int, Results], configs: Sequence[Config], shown: Mapping[str, Film]) -> Report:
+    """Everything about an evaluation of one or several seeds."""
+    config, first = configs[0], next(iter(results.values()))
+    policies = {seed: result.evaluations[POLICY] for seed, result in results.items()}
+    baselines = {title: first.evaluations[title] for title in (ZERO, REPLAY)}
+    scores, failures, *by_type = tables(results, config)
+    objects = [demonstration.object for demonstration in first.world.demonstrations]
+    success = [100 * e.rows()["manip_trans_object"] for e in policies.values()]
+    errors = [e.rows()["tracking_error_cm"] for e in policies.values()]
+    paper = PAPER.get(config.data.grasp)
+    failed = failed_table(policies)
+    seeds = ", ".join(str(seed) for seed in policies)
+    return Report(
+        title=f"{config.name}: evaluation",
+        task=(
+            f"{len(objects)} held-out demonstrations ({', '.join(dict.fromkeys(_grasps(first)))}), which training has "
+            "not seen, from the first frame to the last, unassisted; policies of "
+            f"{len(policies)} training seed{'s' if len(policies) > 1 else ''}."
+        ),
+        headlines=(
+            Headline("success", f"{np.mean(success):.1f} %", _between(success, "%", 1)),
+            Headline("tracking error", f"{np.mean(errors):.2f} cm", _between(errors, "cm", 2)),
+            Headline(
+                "zero residual",
+                f"{100 * baselines[ZERO].rows()['manip_trans_object']:.1f} %",
+                f"demonstration alone {100 * baselines[REPLAY].rows()['manip_trans_object']:.1f} %",
+            ),
+            *(
+                [Headline("paper", f"{100 * paper.success:.1f} %", f"{paper.tracking_error_cm:.2f} cm")]
+                if paper
+                else []
+            ),
+        ),
+        sections=(
+            Section("Success by every metric", [scores]),
+            *([Section("Every grasp type", by_type)] if by_type else []),
+            Section("Demonstration and twin", [shown["worst"], shown["median"]]),
+            Section("Tracking error over time", [Plot(tracking_plot(results), TRACKING)]),
+            Section("How failures failed", [failures]),
+            *([Section("Failures", [failed])] if failed.rows else []),
+            Section("Every demonstration", [demonstration_table(policies, baselines, objects)]),
+        ),
+        how=[
+            ("engine", first.world.env.engine.name),
+            ("seeds", seeds),
+            ("policies", ", ".join(f"{r.checkpoint.steps:,} steps (seed {seed})" for seed, r in results.items())),
+            ("machine", f"{processor()}, {len(jax.devices())} {jax.default_backend()} device(s)"),
+            ("versions", ", ".join(f"{n} {v}" for n, v in versions("mjx-hand", "mujoco", "jax", "brax").items())),
+        ],
+        commands=[f"python -m train.evaluate config={config.name} seeds=[{seeds.replace(' ', '')}]"],
+    )
+
+
+def _grasps(result: Results) -> list[str]:
+    return [demonstration.grasp for demonstration in result.world.demonstrations]
+
+
+def _between(values: Sequence[float], unit: str, digits: int) -> str:
+    if len(values) == 1:
+        return ""
+    return f"seeds from {min(values):.{digits}f} to {max(values):.{digits}f} {unit}"

@@ -1,0 +1,115 @@
+"""What an evaluation leaves on disk: `evaluation.json` (means, failures) and `evaluation.csv` (every rollout)."""
+
+import csv
+import dataclasses
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from envs.demonstrations.dataset import set_folder, told_apart_by
+from envs.evaluation.evaluate import Evaluation
+from envs.grasps import grasp_names, grasp_type
+from mjx_hand.files.npz_archive import replacing
+from train.experiment.evaluate_seeds import POLICY, Results, shared_folder
+from train.reports.type_table import type_scores
+from train.settings.config import Config
+
+SCHEMA = "mjx-hand/evaluation/1"
+
+
+def write_results(results: Mapping[int, Results], configs: Sequence[Config], films: Mapping[str, Any]) -> Path:
+    """Write both files for one or several seeds, and return their folder.
+
+    Args:
+        results: by seed.
+        configs: that were evaluated.
+        films: notes on the videos beside them, by name.
+    """
+    out, config, first = shared_folder(configs), configs[0], next(iter(results.values()))
+    policies = {seed: result.evaluations[POLICY] for seed, result in results.items()}
+    baselines = {title: e for title, e in first.evaluations.items() if title != POLICY}
+    grasps = [demonstration.grasp for demonstration in first.world.demonstrations]
+    by_type = [type_scores(e, grasps) for e in policies.values()]
+    summary = {
+        "schema": SCHEMA,
+        "experiment": config.name,
+        "grasp": config.data.grasp,
+        "engine": first.world.env.engine.name,
+        "checkpoint_steps": {seed: result.checkpoint.steps for seed, result in results.items()},
+        "demonstrations": len(first.world.demonstrations),
+        "scores": {POLICY: _mean([e.rows() for e in policies.values()]), **{t: e.rows() for t, e in baselines.items()}},
+        "types": {
+            POLICY: {grasp: _mean([scores[grasp] for scores in by_type]) for grasp in by_type[0]},
+            **{title: type_scores(e, grasps) for title, e in baselines.items()},
+        },
+        "seeds": {seed: e.rows() for seed, e in policies.items()},
+        "failures": {
+            POLICY: _mean([e.failure_shares() for e in policies.values()]),
+            **{title: e.failure_shares() for title, e in baselines.items()},
+        },
+        "failed": [failed for seed, e in policies.items() for failed in _failed(seed, e)],
+        "films": films,
+        "made_of": made_of(configs),
+    }
+    with replacing(out / "evaluation.json") as temporary:
+        temporary.write_text(json.dumps(summary, indent=1) + "\n")
+    with replacing(out / "evaluation.csv") as temporary, temporary.open("w", newline="") as file:
+        names = list(next(iter(policies.values())).scores)
+        rows = csv.writer(file)
+        rows.writerow(["column", "seed", "demonstration", *names, "failure"])
+        every = [(POLICY, seed, e) for seed, e in policies.items()] + [(t, "", e) for t, e in baselines.items()]
+        for title, seed, e in every:
+            for k, demonstration in enumerate(e.demonstration):
+                rows.writerow([title, seed, int(demonstration), *(f"{e.scores[n][k]:g}" for n in names), e.failure[k]])
+    return out
+
+
+def kept_results(configs: Sequence[Config]) -> dict[str, Any] | None:
+    """The summary of an evaluation of the very same policies with the same settings, None where there is none."""
+    path = shared_folder(configs) / "evaluation.json"
+    if not path.is_file():
+        return None
+    try:
+        summary = json.loads(path.read_text())
+    except ValueError:  # a file of someone else's: it is written anew
+        return None
+    same = isinstance(summary, dict) and summary.get("made_of") == made_of(configs)
+    return summary if same and summary["films"] else None
+
+
+def made_of(configs: Sequence[Config]) -> str:
+    """A digest of all that an evaluation depends on: settings, demonstrations, policies and the version."""
+    content = hashlib.sha256(version("mjx-hand").encode())
+    for config in configs:
+        parts = [told_apart_by(config.data)]
+        parts += [dataclasses.asdict(part) for part in (config.task, config.ppo, config.checks)]
+        sets = [set_folder(settings, config.demonstrations).name for settings in config.data.of_each_type()]
+        forces = [grasp_type(name).grip_force for name in grasp_names()]
+        told = [config.name, config.engine, config.seed, sets, forces, parts]
+        content.update(json.dumps(told, sort_keys=True).encode())
+        policy = Path(config.checkpoint) if config.checkpoint else Path(config.out) / "best.npz"
+        for path in (policy, Path(config.out) / "curve.csv"):
+            content.update(path.read_bytes() if path.is_file() else b"none")
+    return content.hexdigest()
+
+
+def _mean(rows: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    return {name: float(np.mean([row[name] for row in rows])) for name in rows[0]}
+
+
+def _failed(seed: int, evaluation: Evaluation) -> list[dict[str, Any]]:
+    return [
+        {
+            "seed": seed,
+            "demonstration": int(evaluation.demonstration[k]),
+            "reason": reason,
+            **{n: float(evaluation.scores[n][k]) for n in ("tracking_error_cm", "object_rotation_error_deg")},
+        }
+        for k, reason in enumerate(evaluation.failure)
+        if reason
+    ]

@@ -1,0 +1,118 @@
+"""All experiments in one table: a row an experiment, and their mean."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mjx_hand.view.report import Table
+from train.experiment.evaluate_seeds import POLICY, REPLAY, ZERO
+from train.learning.curve import LEARNED, Point, minutes_to_learn
+from train.reports.published import PAPER, Published
+from train.reports.score_table import score_text
+
+FIVE = tuple(name for name in PAPER if name != "all")  # grasp types, of which "all" is the mean
+
+
+@dataclasses.dataclass(frozen=True)
+class Experiment:
+    """A trained and evaluated experiment.
+
+    Attributes:
+        name: of the experiment.
+        folder: of its evaluation.
+        summary: what `evaluation.json` says.
+        curves: the evaluations while training, by seed.
+    """
+
+    name: str
+    folder: Path
+    summary: Mapping[str, Any]
+    curves: Mapping[int, Sequence[Point]]
+
+    @property
+    def paper(self) -> Published | None:
+        return PAPER.get(self.summary["grasp"])
+
+
+_SUCCESS, _ERROR, _TURN = "manip_trans_object", "tracking_error_cm", "object_rotation_error_deg"
+_COLUMNS = (
+    *("", "success", "least seed", "paper's success", "zero residual", "demonstration alone", "tracking error"),
+    *("paper's tracking error", "rotation error", "held 5 s", "CHORD"),
+    *(f"minutes to {100 * LEARNED:.0f} %", "minutes of training"),
+)
+_NOTE = (
+    "Success: ManipTrans' for the object, mean errors below 3 cm and 30°; the paper does not define its own. Means "
+    "over seeds; every rollout of every held-out demonstration counts, from frame 0, unassisted. Minutes of one "
+    f"training, until its check on the training demonstrations first reached {100 * LEARNED:.0f} %, and until its end."
+)
+
+
+def results_table(experiments: Sequence[Experiment]) -> Table:
+    """Success, errors and training times of every experiment beside the paper's, and their mean."""
+    rows = [_row(experiment.name, [experiment], experiment.paper) for experiment in experiments]
+    if len(experiments) > 1:
+        all_five = sorted(experiment.summary["grasp"] for experiment in experiments) == sorted(FIVE)
+        rows.append(_row("mean", experiments, PAPER["all"] if all_five else None))
+    return Table(_COLUMNS, rows, _NOTE)
+
+
+def failures_table(experiments: Sequence[Experiment]) -> Table:
+    """Every failed rollout of every policy, with its reason."""
+    rows = [
+        (
+            f"{experiment.name}, demonstration {failed['demonstration']}",
+            f"seed {failed['seed']}",
+            failed["reason"],
+            *(score_text(name, failed[name]) for name in (_ERROR, _TURN)),
+        )
+        for experiment in experiments
+        for failed in sorted(experiment.summary["failed"], key=lambda f: (f["demonstration"], f["seed"]))
+    ]
+    return Table(("", "policy", "reason", "tracking error", "rotation error"), rows)
+
+
+def minutes_of(curves: Mapping[int, Sequence[Point]]) -> tuple[list[float], list[float]]:
+    """Minutes to learn of the seeds that did, and minutes in total of all."""
+    learned = [minutes for points in curves.values() if (minutes := minutes_to_learn(points)) is not None]
+    return learned, [points[-1].seconds / 60 for points in curves.values()]
+
+
+def _row(title: str, experiments: Sequence[Experiment], paper: Published | None) -> tuple[str, ...]:
+    def mean(column: str, name: str) -> str:
+        values = [scores[name] for e in experiments if name in (scores := e.summary["scores"][column])]
+        return score_text(name, float(np.mean(values))) if len(values) == len(experiments) else ""
+
+    return (
+        title,
+        mean(POLICY, _SUCCESS),
+        _least_seed(experiments),
+        score_text(_SUCCESS, paper.success) if paper else "",
+        mean(ZERO, _SUCCESS),
+        mean(REPLAY, _SUCCESS),
+        mean(POLICY, _ERROR),
+        score_text(_ERROR, paper.tracking_error_cm) if paper else "",
+        *(mean(POLICY, name) for name in (_TURN, "hold", "chord")),
+        *_minutes(experiments),
+    )
+
+
+def _least_seed(experiments: Sequence[Experiment]) -> str:
+    """Success of the seed that has least, each seed's own mean over the experiments; they must have the same seeds."""
+    seeds = {tuple(experiment.summary["seeds"]) for experiment in experiments}
+    if len(seeds) > 1:
+        return ""
+    means = [np.mean([e.summary["seeds"][seed][_SUCCESS] for e in experiments]) for seed in seeds.pop()]
+    return score_text(_SUCCESS, float(min(means)))
+
+
+def _minutes(experiments: Sequence[Experiment]) -> tuple[str, str]:
+    each = [minutes_of(experiment.curves) for experiment in experiments]
+    learned = [minutes for some, _ in each for minutes in some]
+    total = [minutes for _, every in each for minutes in every]
+    if not learned:
+        return "not reached", f"{np.mean(total):.1f}"
+    few = "" if len(learned) == len(total) else f" ({len(learned)} of {len(total)})"
+    return f"{np.mean(learned):.1f}{few}", f"{np.mean(total):.1f}"

@@ -1,0 +1,152 @@
+"""Evaluations as tables for reports: a row a metric, a column a policy, and the paper's figures beside them."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from envs.evaluation.evaluate import Evaluation
+from envs.evaluation.failure import FAILURES
+from mjx_hand.errors import InputError
+from mjx_hand.objects.description import ObjectDescription
+from mjx_hand.view.report import Table
+from train.reports.published import Published
+
+TITLES = {
+    "manip_trans_object": "ManipTrans, object: means below 3 cm and 30°",
+    "manip_trans_full": "ManipTrans: also joints below 8 cm, tips below 6 cm",
+    "spider": "SPIDER: means below 10 cm and 0.5 rad",
+    "chord": "CHORD: never past 10 cm, 0.5 rad, wrist 15 cm",
+    "hold": "still held 5 s later, slip below 2 cm",
+    "add_auc": "ADD-AUC, 1 to 9 cm",
+    "tracking_error_cm": "tracking error, mean over all rollouts",
+    "object_rotation_error_deg": "object rotation error",
+    "joint_error_cm": "joint position error",
+    "tip_error_cm": "finger tip position error",
+}
+
+
+def score_table(
+    evaluations: Mapping[str, Sequence[Evaluation]], paper: Published | None = None, note: str = ""
+) -> Table:
+    """Every metric of every evaluation, and the paper's column where it is given.
+
+    Args:
+        evaluations: column title to its evaluations, one a seed. Several give two columns: the mean over the seeds,
+            and the range from the least seed to the greatest.
+        paper: the paper's row for the same grasp type; its success, which it does not define, gets a row of its own.
+        note: printed below the table.
+
+    Raises:
+        InputError: no evaluations.
+    """
+    if not evaluations:
+        raise InputError("no evaluations to show; give at least one column")
+    means = {title: [e.rows() for e in each] for title, each in evaluations.items()}
+    columns = [column for title, each in means.items() for column in _columns(title, len(each))]
+    rows = []
+    for name, title in TITLES.items():
+        cells = [cell for each in means.values() for cell in _cells(name, [row.get(name) for row in each])]
+        published = [score_text(name, paper.tracking_error_cm) if name == "tracking_error_cm" else ""] if paper else []
+        if any(cells):
+            rows.append((title, *cells, *published))
+    if paper:
+        rows.insert(0, ("success, by the paper's own count", *[""] * len(columns), f"{100 * paper.success:.1f} %"))
+    return Table(("", *columns, *(["paper"] if paper else [])), rows, note)
+
+
+def failure_table(evaluations: Mapping[str, Sequence[Evaluation]], note: str = "") -> Table:
+    """How rollouts failed ManipTrans' object criterion, as shares of all rollouts of all seeds."""
+    shares = [[e.failure_shares() for e in each] for each in evaluations.values()]
+    rows = [(reason, *(f"{100 * np.mean([s[reason] for s in each]):.1f} %" for each in shares)) for reason in FAILURES]
+    return Table(("", *evaluations), rows, note)
+
+
+def demonstration_table(
+    policies: Mapping[int, Evaluation], baselines: Mapping[str, Evaluation], objects: Sequence[ObjectDescription]
+) -> Table:
+    """A row a demonstration: its object, and what became of it under each seed's policy and each baseline.
+
+    Args:
+        policies: seed to its evaluation, one rollout a demonstration.
+        baselines: title to its evaluation, likewise.
+        objects: each demonstration's object.
+    """
+    columns = {f"seed {seed}": e for seed, e in policies.items()} | dict(baselines)
+    rows = [
+        (f"{k}: {object_text(thing)}", *(_outcome(e, k) for e in columns.values())) for k, thing in enumerate(objects)
+    ]
+    return Table(("demonstration", *columns), rows, "Tracking error (cm), and why it failed where it did.")
+
+
+def failed_table(policies: Mapping[int, Evaluation]) -> Table:
+    """Every failed rollout of every seed and its reason (`failure.failure_reasons`), by demonstration."""
+    failed = sorted(
+        (int(e.demonstration[k]), seed, reason, k)
+        for seed, e in policies.items()
+        for k, reason in enumerate(e.failure)
+        if reason
+    )
+    rows = [
+        (
+            f"demonstration {demonstration}",
+            f"seed {seed}",
+            reason,
+            *(score_text(n, policies[seed].scores[n][k]) for n in ("tracking_error_cm", "object_rotation_error_deg")),
+        )
+        for demonstration, seed, reason, k in failed
+    ]
+    return Table(("", "policy", "reason", "tracking error", "rotation error"), rows, _REASONS)
+
+
+def object_text(thing: ObjectDescription) -> str:
+    """An object in words: kind, size in mm, mass in g and friction."""
+    mm = [f"{1000 * value:.0f}" for value in 2 * np.asarray(thing.size)]
+    sizes = {
+        "sphere": f"⌀ {mm[0]}",
+        "cylinder": f"⌀ {mm[0]} × {mm[1]}",
+        "capsule": f"⌀ {mm[0]} × {1000 * 2 * (thing.size[0] + thing.size[1]):.0f}",
+    }
+    size = sizes.get(thing.kind, " × ".join(mm))
+    return f"{thing.kind} {size} mm, {1000 * float(thing.mass):.0f} g, friction {float(thing.friction):.2f}"
+
+
+def score_text(name: str, value: float) -> str:
+    """A metric's value with its unit."""
+    unit = " cm" if name.endswith("_cm") else "°" if name.endswith("_deg") else "" if name == "add_auc" else " %"
+    return f"{score_number(name, value)}{unit}"
+
+
+def score_number(name: str, value: float) -> str:
+    """A metric's value in its unit, without it."""
+    if name.endswith("_cm"):
+        return f"{value:.2f}"
+    if name.endswith("_deg"):
+        return f"{value:.1f}"
+    return f"{value:.3f}" if name == "add_auc" else f"{100 * value:.1f}"
+
+
+_REASONS = (
+    "Never lifted: did not rise by half of what was demonstrated. Dropped: rose, but ended below half of the height. "
+    "Rotated: in place, but turned. Late: in place up to 1 s too late. Strayed: held, but elsewhere."
+)
+
+
+def _columns(title: str, seeds: int) -> list[str]:
+    return [title] if seeds == 1 else [f"{title}, mean of {seeds} seeds", "least to greatest"]
+
+
+def _cells(name: str, values: Sequence[float | None]) -> list[str]:
+    given = [value for value in values if value is not None]
+    if not given:
+        return [""] * len(_columns("", len(values)))
+    mean = score_text(name, float(np.mean(given)))
+    if len(values) == 1:
+        return [mean]
+    least, greatest = score_text(name, min(given)), score_text(name, max(given))
+    return [mean, least if least == greatest else f"{score_number(name, min(given))} to {greatest}"]
+
+
+def _outcome(evaluation: Evaluation, demonstration: int) -> str:
+    (k,) = np.flatnonzero(evaluation.demonstration == demonstration)
+    error, reason = f"{evaluation.scores['tracking_error_cm'][k]:.2f}", evaluation.failure[k]
+    return f"{reason}, {error}" if reason else f"✓ {error}"

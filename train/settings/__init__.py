@@ -1,0 +1,1 @@
+"""What a command is told: configurations and options, devices and processes."""

@@ -1,0 +1,222 @@
+"""The typed configuration of an experiment, composed by Hydra from `configs/`, checked before anything is compiled."""
+
+import dataclasses
+import difflib
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import hydra
+from hydra.core.config_store import ConfigStore
+from hydra.errors import HydraException
+from omegaconf import DictConfig, ListConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from envs.demonstrations.dataset import SetSettings
+from envs.physics import ENGINES
+from envs.settings import made_of
+from envs.task import Task
+from mjx_hand.compile_cache import enable_compile_cache
+from mjx_hand.errors import InputError
+from train.settings.device import DEVICES, use_device, with_device
+from train.settings.options import Checks, Debug, Distributed, Play, Ppo
+
+
+@dataclasses.dataclass(frozen=True)
+class Config:
+    """An experiment.
+
+    Attributes:
+        name: of the experiment.
+        engine: auto, native, mjx or warp; auto picks by the device (docs/training.md).
+        device: cpu or gpu: what JAX computes on, and with it how many worlds (`configs/device`).
+        seed: of networks, resets and actions.
+        seeds: for commands that take several seeds of one experiment; empty for `seed` alone.
+        out: folder for checkpoints, logs and results.
+        demonstrations: folder below which demonstration sets are kept, and made where missing.
+        checkpoint: what to evaluate or play; empty for the best of `out`.
+        data: which demonstrations.
+        task: what an episode is.
+        ppo: how to learn.
+        checks: evaluation while training.
+        fresh: start anew although `out` holds a training to go on from.
+        distributed: several processes.
+        debug: help with what goes wrong.
+        play: what to show.
+    """
+
+    name: str = "pinch"
+    engine: str = "auto"
+    device: str = "cpu"
+    seed: int = 0
+    seeds: tuple[int, ...] = ()
+    out: str = "outputs/${name}/seed${seed}"
+    demonstrations: str = "outputs/demonstrations"
+    checkpoint: str = ""
+    data: SetSettings = dataclasses.field(default_factory=lambda: SetSettings(grasp="pinch"))
+    task: Task = dataclasses.field(default_factory=Task)
+    ppo: Ppo = dataclasses.field(default_factory=Ppo)
+    checks: Checks = dataclasses.field(default_factory=Checks)
+    fresh: bool = False
+    distributed: Distributed = dataclasses.field(default_factory=Distributed)
+    debug: Debug = dataclasses.field(default_factory=Debug)
+    play: Play = dataclasses.field(default_factory=Play)
+
+    def __post_init__(self):
+        if self.engine not in ("auto", *ENGINES):
+            raise InputError(f"engine is {self.engine!r}; valid: auto, {', '.join(ENGINES)}")
+        if self.device not in DEVICES:
+            raise InputError(f"device is {self.device!r}; valid: auto, {', '.join(DEVICES)}")
+
+
+def compose(overrides: Sequence[str] = ()) -> Config:
+    """The configuration that these command-line overrides give.
+
+    Raises:
+        InputError: an unknown key, experiment or value, naming the valid ones; or `seeds`.
+    """
+    return to_config(_composed(overrides))
+
+
+def compose_seeds(overrides: Sequence[str] = ()) -> list[Config]:
+    """The configuration of each of `seeds`, as `of_seeds`.
+
+    Raises:
+        InputError: as `compose` and `of_seeds`.
+    """
+    return of_seeds(_composed(overrides))
+
+
+def _composed(overrides: Sequence[str]) -> DictConfig:
+    _store_schema()
+    overrides = with_device(overrides)
+    try:
+        with hydra.initialize_config_module("configs", version_base=None):
+            base = hydra.compose("train", [o for o in overrides if o.startswith(("config=", "device="))])
+            for override in overrides:
+                _check_key(base, override.split("=", 1)[0].lstrip("+~"))
+            return hydra.compose("train", list(overrides))
+    except (HydraException, OmegaConfBaseException) as error:
+        raise InputError(one_line(error)) from None
+
+
+def of_seeds(composed: DictConfig) -> list[Config]:
+    """A configuration for each of `seeds`, or for `seed` alone where they are empty; `out` follows the seed.
+
+    Raises:
+        InputError: a seed given twice, or an `out` or a `checkpoint` that is the same for several seeds.
+    """
+    seeds = list(composed.seeds or [composed.seed])
+    configs = []
+    for seed in seeds:
+        one = composed.copy()
+        one.seed, one.seeds = seed, []
+        configs.append(to_config(one))
+    if len(set(seeds)) < len(seeds):
+        raise InputError(f"seeds is {seeds}; give each seed once")
+    if len({config.out for config in configs}) < len(configs):
+        raise InputError(
+            f"out is {configs[0].out} for every seed; put ${{seed}} into it: out='{composed.out}/seed${{seed}}'"
+        )
+    if len(configs) > 1 and composed.checkpoint:
+        raise InputError("checkpoint=FILE is one seed's policy; leave out seeds=..., or checkpoint=... for their best")
+    return configs
+
+
+def to_config(composed: DictConfig) -> Config:
+    """The composed configuration as checked dataclasses.
+
+    Raises:
+        InputError: a value that cannot be used, or `seeds`, which are not one configuration.
+    """
+    if composed.seeds:
+        raise InputError(f"seeds is {list(composed.seeds)}, but this takes one seed; give it alone, such as seed=0")
+    return made_of(Config, OmegaConf.to_container(composed, resolve=True, throw_on_missing=True))
+
+
+def command(task: Callable[[Config], object]) -> None:
+    """Run `task` with the configuration of this process's arguments; Hydra's own flags (`--cfg job`) work too.
+
+    Input that cannot be used ends the process with one line and status 2.
+    """
+    _command(lambda composed: task(_on_device(to_config(composed))))
+
+
+def command_of_seeds(task: Callable[[Sequence[Config]], object]) -> None:
+    """Like `command`, for a task that takes the configurations of several seeds (`seeds=[0,1,2]`)."""
+    _command(lambda composed: task([_on_device(config) for config in of_seeds(composed)]))
+
+
+def _on_device(config: Config) -> Config:
+    use_device(config.device, config.distributed)
+    return config
+
+
+def _command(task: Callable[[DictConfig], object]) -> None:
+    def job(composed: DictConfig) -> None:
+        try:
+            task(composed)
+        except InputError as error:
+            refuse(error)
+
+    _store_schema()
+    enable_compile_cache()
+    arguments = sys.argv[1:]
+    if not any(argument.startswith("-") for argument in arguments):
+        try:
+            of_seeds(_composed(arguments))
+        except InputError as error:
+            refuse(error)
+    try:
+        sys.argv[1:] = with_device(arguments)
+    except InputError as error:
+        refuse(error)
+    hydra.main(version_base=None, config_path="pkg://configs", config_name="train")(job)()
+
+
+def refuse(error: InputError) -> None:
+    """End the process with one line and status 2."""
+    print(f"train: {error}", file=sys.stderr)
+    sys.exit(2)
+
+
+def _store_schema() -> None:
+    schema = OmegaConf.structured(Config)
+    _make_writable(schema)  # frozen dataclasses make read-only nodes, which overrides could not change
+    ConfigStore.instance().store(name="schema", node=schema)
+
+
+def _make_writable(node: Any) -> None:
+    if isinstance(node, DictConfig):
+        OmegaConf.set_readonly(node, False)
+        for name in node:
+            _make_writable(node._get_node(name))
+    elif isinstance(node, ListConfig):
+        OmegaConf.set_readonly(node, False)
+        for index in range(len(node)):
+            _make_writable(node._get_node(index))
+
+
+def _check_key(base: DictConfig, key: str) -> None:
+    if key in ("config", "device") or key.startswith("hydra"):
+        return
+    node: Any = base
+    parts = key.split(".")
+    for depth, part in enumerate(parts):
+        valid = [str(k) for k in node] if isinstance(node, DictConfig) else []
+        if part not in valid:
+            where = ".".join(parts[:depth])
+            near = difflib.get_close_matches(part, valid, n=1)
+            hint = f"; did you mean {'.'.join([*parts[:depth], near[0]])}?" if near else ""
+            raise InputError(
+                f"{key!r} is not an option{hint}"
+                + (f"; valid {'in ' + where if where else 'options'}: {', '.join(valid)}" if valid else "")
+            )
+        node = node[part]
+
+
+def one_line(error: Exception) -> str:
+    """What Hydra or OmegaConf says, without its search paths and types; the cause says more than the wrapper."""
+    text = str(error.__cause__ or error).split("Config search path")[0]
+    lines = [line.strip().rstrip(":") for line in text.splitlines() if line.strip()]
+    return "; ".join(line for line in lines if not line.startswith(("object_type", "reference_type")))

@@ -1,0 +1,1 @@
+"""Rollouts as scenes and videos."""

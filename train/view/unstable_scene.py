@@ -1,0 +1,61 @@
+"""A simulation that diverged as a scene for the browser viewer: each physics step, and what was commanded."""
+
+import numpy as np
+
+from envs.scene import NUM_WRIST
+from mjx_hand.errors import InputError
+from mjx_hand.hand.joints import NUM_HINGES
+from mjx_hand.pytree import replace
+from mjx_hand.view.browser.hand_scene import object_layers, twin_layer
+from mjx_hand.view.browser.scene import Curve, Scene
+from train.experiment.setup import World
+from train.learning.unstable import Unstable, step_again
+from train.view.play_scene import ghost, posed
+
+_NUM_TARGETS = NUM_WRIST + NUM_HINGES
+
+
+def unstable_scene(unstable: Unstable, world: World, name: str) -> Scene:
+    """The state before the step, then one frame a physics step, with the commanded pose as a grey ghost.
+
+    Targets that are no numbers are drawn where the hand was.
+
+    Args:
+        unstable: the step.
+        world: demonstrations that the training had.
+        name: of the experiment.
+
+    Raises:
+        InputError: they are not those that the simulation followed.
+    """
+    engine, k = world.env.engine, unstable.demonstration
+    if not 0 <= k < len(world.demonstrations) or len(unstable.qpos) != engine.models[0].nq:
+        raise InputError(
+            f"play.unstable follows demonstration {k} in {len(unstable.qpos)} coordinates; {name!r} has "
+            f"{len(world.demonstrations)} of {engine.models[0].nq}: give the config and data it was trained with"
+        )
+    demonstration, hand = world.demonstrations[k], world.hands[k]
+    fps = float(1 / engine.models[k].opt.timestep)
+    path = step_again(engine.models[k], unstable, engine.substeps)
+    motion = posed(demonstration, path, fps)
+    told = np.where(np.isfinite(unstable.targets), unstable.targets, unstable.qpos[:_NUM_TARGETS])
+    commanded = posed(demonstration, np.repeat(told[None], len(path), axis=0), fps)
+    shown = replace(demonstration, motion=motion, object_pose=path[:, _NUM_TARGETS:])
+    layers = (
+        twin_layer(motion, hand, "twin"),
+        *object_layers(shown),
+        ghost(twin_layer(commanded, hand, "commanded")),
+    )
+    away = path - path[0]
+    turned = np.rad2deg(np.abs(away[:, NUM_WRIST:_NUM_TARGETS]).max(axis=1))
+    curves = (
+        Curve("object, moved", 100 * np.linalg.norm(away[:, _NUM_TARGETS : _NUM_TARGETS + 3], axis=1), "cm"),
+        Curve("hinge that turned most", turned, "degrees"),
+    )
+    title = (
+        f"{name} seed {unstable.seed}, world {unstable.world} at {unstable.steps:,} steps: demonstration {k}, frame "
+        f"{unstable.frame}; {len(path) - 1} of {engine.substeps} physics steps"
+    )
+    if lost := np.flatnonzero(~np.isfinite(unstable.targets)).tolist():
+        title += f"; targets {lost} are no numbers"
+    return Scene(title=title, fps=fps, layers=layers, curves=curves, ground=0.0)
