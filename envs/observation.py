@@ -56,11 +56,11 @@ def observe(
     targets, poses = reference.targets[demonstration], reference.object_pose[demonstration]
     now, pose = targets[frame], poses[frame]
     hand, hand_speed = physics.qpos[:_NUM_TARGETS], physics.qvel[:_NUM_TARGETS]
-    thing, speed = physics.qpos[_NUM_TARGETS:], physics.qvel[_NUM_TARGETS:]
-    thing_axes = quaternion_to_matrix(thing[3:])
-    tips = (physics.sensordata.reshape(5, 3) - thing[:3]) @ thing_axes
+    object_pose, speed = physics.qpos[_NUM_TARGETS:], physics.qvel[_NUM_TARGETS:]
+    object_axes = quaternion_to_matrix(object_pose[3:])
+    tips = (physics.sensordata.reshape(5, 3) - object_pose[:3]) @ object_axes
     wrist = wrist_rotation(hand[3:NUM_WRIST], base)
-    in_hand = wrist.T @ (thing[:3] - base @ hand[:3])
+    in_hand = wrist.T @ (object_pose[:3] - base @ hand[:3])
 
     later = jnp.minimum(frame + jnp.array(task.ahead), reference.length[demonstration] - 1)
     features = jnp.concatenate(
@@ -69,15 +69,15 @@ def observe(
             hand_speed * _SPEED_SCALE,
             residual / residual_scale(task),
             reference.grip[demonstration, frame, NUM_WRIST:] * 5.0,
-            base.T @ (thing[:3] - pose[:3]) * _LENGTH_SCALE,
-            quaternion_difference(pose[3:], thing[3:]) * 3.0,
+            base.T @ (object_pose[:3] - pose[:3]) * _LENGTH_SCALE,
+            quaternion_difference(pose[3:], object_pose[3:]) * 3.0,
             base.T @ speed[:3] * 3.0,
             speed[3:] * 0.2,
             (in_hand - jnp.array([-0.1, -0.05, 0.03])) * 10.0,  # about where a grasped object is
             (tips * _LENGTH_SCALE).ravel(),
             ((targets[later] - now) * _TARGET_SCALE).ravel(),
             ((poses[later, :3] - pose[:3]) @ base * _LENGTH_SCALE).ravel(),
-            jnp.array([2.0 * frame / reference.length[demonstration] - 1.0, (thing[2] - poses[0, 2]) * 10.0]),
+            jnp.array([2.0 * frame / reference.length[demonstration] - 1.0, (object_pose[2] - poses[0, 2]) * 10.0]),
             reference.features[demonstration] * _FEATURE_SCALE,
         ]
     )

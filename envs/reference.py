@@ -97,9 +97,9 @@ def make_reference(
 def object_in_hand(demonstration: Demonstration) -> tuple[Float[np.ndarray, "t 3 3"], Float[np.ndarray, "t 3"]]:
     """The object's rotation and position (m) in the wrist's frame."""
     wrist = Rotation.from_quat(demonstration.motion.wrist_quaternion, scalar_first=True).inv()
-    thing = Rotation.from_quat(demonstration.object_pose[:, 3:], scalar_first=True)
+    object_rotation = Rotation.from_quat(demonstration.object_pose[:, 3:], scalar_first=True)
     offset = demonstration.object_pose[:, :3] - demonstration.motion.wrist_position
-    return (wrist * thing).as_matrix(), wrist.apply(offset)
+    return (wrist * object_rotation).as_matrix(), wrist.apply(offset)
 
 
 def anticipated(targets: Float[Array, "d t 26"], gains: Gains, fps: float) -> Float[Array, "d t 26"]:
@@ -131,8 +131,8 @@ def _grips(
     def offsets(a: Array, r: Array, p: Array, hand: RigidHand, size: Array, planes: Array, force: Array) -> Array:
         return grip_offsets(a, (r, p), hand, kind, size, force, gains, planes if kind == "mesh" else None)
 
-    sizes = jnp.asarray(np.stack([thing.size for thing in objects]), jnp.float32)
-    planes = jnp.asarray(_stacked_planes([thing.hulls for thing in objects]), jnp.float32)
+    sizes = jnp.asarray(np.stack([description.size for description in objects]), jnp.float32)
+    planes = jnp.asarray(_stacked_planes([description.hulls for description in objects]), jnp.float32)
     return offsets(angles, rotation, position, stack_hands(hands), sizes, planes, jnp.asarray(forces, jnp.float32))
 
 

@@ -55,10 +55,10 @@ def assisted_replay(
 def with_heavy_object(model: mujoco.MjModel) -> mujoco.MjModel:
     """A copy in which fingers cannot push the object away or sink into it while it is carried."""
     heavy = copy.copy(model)
-    thing = heavy.body(OBJECT).id
-    heavy.body_mass[thing] *= _HEAVIER
-    heavy.body_inertia[thing] *= _HEAVIER
-    heavy.body_gravcomp[thing] = 1.0
+    object_id = heavy.body(OBJECT).id
+    heavy.body_mass[object_id] *= _HEAVIER
+    heavy.body_inertia[object_id] *= _HEAVIER
+    heavy.body_gravcomp[object_id] = 1.0
     mujoco.mj_setConst(heavy, mujoco.MjData(heavy))
     return heavy
 

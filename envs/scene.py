@@ -35,7 +35,7 @@ _GEOM = {
 
 def scene_spec(
     rigid: RigidHand,
-    thing: ObjectDescription,
+    description: ObjectDescription,
     support: Float[np.ndarray, "b 3"],
     support_position: Float[np.ndarray, "b 3"],
     base_rotation: Float[np.ndarray, "3 3"],
@@ -49,7 +49,7 @@ def scene_spec(
 
     Args:
         rigid: the hand.
-        thing: the object.
+        description: of the object.
         support, support_position: half extents and centres (m, world) of the boxes that hold the object up, if it does
             not stand on the table.
         base_rotation: world_from_base; the wrist's slides run along the base's axes and its turns start from it, so
@@ -60,8 +60,8 @@ def scene_spec(
         assisted: with six motors on the object, after the hand's actuators: a force (N, world axes) and a torque (N m,
             the object's axes).
     """
-    if thing.kind not in OBJECT_KINDS:
-        raise InputError(f"object kind {thing.kind!r} is not known; valid: {', '.join(OBJECT_KINDS)}")
+    if description.kind not in OBJECT_KINDS:
+        raise InputError(f"object kind {description.kind!r} is not known; valid: {', '.join(OBJECT_KINDS)}")
     spec = hand_spec(rigid, base="actuated", visual=visual, gains=gains)
     spec.option.timestep = TIMESTEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -73,8 +73,8 @@ def scene_spec(
     for geom in spec.geoms:
         if geom.contype:
             geom.contype, geom.conaffinity = _HAND_MEETS
-            _contact(geom, thing.friction, condim=4)  # torsion too: a pad is an area, not a point
-    _add_ground(spec, support, support_position, thing.friction)
+            _contact(geom, description.friction, condim=4)  # torsion too: a pad is an area, not a point
+    _add_ground(spec, support, support_position, description.friction)
     for k in range(spare):
         box = spec.worldbody.add_geom(name=f"{SPARE}{k}", type=_GEOM["box"], size=[0.001] * 3, pos=[0.0, 0.0, -0.1])
         box.contype, box.conaffinity = _SPARE_MEETS
@@ -83,10 +83,10 @@ def scene_spec(
     for k, gear in enumerate(np.eye(6) if assisted else ()):
         motor = spec.add_actuator(name=f"{OBJECT}_motor{k}", target=OBJECT, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         motor.gear = gear
-    for geom in _object_geoms(spec, body, thing):
+    for geom in _object_geoms(spec, body, description):
         geom.rgba = (0.9, 0.35, 0.2, 1.0)
         geom.contype, geom.conaffinity = _OBJECT_MEETS
-        _contact(geom, thing.friction)
+        _contact(geom, description.friction)
     # MJX alone reads these: it works every possible contact out, and is a tenth as quick without a cap.
     for name, most in MJX_CAPS.items():
         spec.add_numeric(name=name, data=[most])
@@ -95,7 +95,7 @@ def scene_spec(
 
 def scene_model(
     rigid: RigidHand,
-    thing: ObjectDescription,
+    description: ObjectDescription,
     support: Float[np.ndarray, "b 3"],
     support_position: Float[np.ndarray, "b 3"],
     base_rotation: Float[np.ndarray, "3 3"],
@@ -108,7 +108,7 @@ def scene_model(
     """Compile the scene; arguments as of `scene_spec`."""
     return scene_spec(
         rigid,
-        thing,
+        description,
         support,
         support_position,
         base_rotation,
@@ -119,16 +119,16 @@ def scene_model(
     ).compile()
 
 
-def _object_geoms(spec: mujoco.MjSpec, body: mujoco.MjsBody, thing: ObjectDescription) -> list[mujoco.MjsGeom]:
+def _object_geoms(spec: mujoco.MjSpec, body: mujoco.MjsBody, description: ObjectDescription) -> list[mujoco.MjsGeom]:
     """The object's geoms with their masses: one, or one a convex piece of a mesh."""
-    if thing.kind != "mesh":
-        return [body.add_geom(name=OBJECT, type=_GEOM[thing.kind], size=thing.size, mass=thing.mass)]
-    volumes = np.array([ConvexHull(hull).volume for hull in thing.hulls])
+    if description.kind != "mesh":
+        return [body.add_geom(name=OBJECT, type=_GEOM[description.kind], size=description.size, mass=description.mass)]
+    volumes = np.array([ConvexHull(hull).volume for hull in description.hulls])
     geoms = []
-    for k, (hull, share) in enumerate(zip(thing.hulls, volumes / volumes.sum(), strict=True)):
+    for k, (hull, share) in enumerate(zip(description.hulls, volumes / volumes.sum(), strict=True)):
         name = f"{OBJECT}{k}"
         spec.add_mesh(name=name).uservert = np.unique(hull, axis=0).ravel()
-        mass = thing.mass * share
+        mass = description.mass * share
         geoms.append(body.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, mass=mass))
     return geoms
 

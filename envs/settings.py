@@ -4,13 +4,13 @@ import dataclasses
 from typing import Any
 
 
-def made_of(cls: Any, values: Any) -> Any:
+def from_dict(cls: Any, values: Any) -> Any:
     """A dataclass from nested dictionaries. Configuration files have lists where frozen dataclasses have tuples."""
     given = {}
     for field in dataclasses.fields(cls):
         if field.name in values:
             value = values[field.name]
             if isinstance(value, dict):
-                value = made_of(field.type, value)
+                value = from_dict(field.type, value)
             given[field.name] = tuple(value) if isinstance(value, list) else value
     return cls(**given)

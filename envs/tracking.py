@@ -23,7 +23,7 @@ from envs.replay import assisted_replay
 from envs.scene import NUM_WRIST, OBJECT, demonstration_models
 from envs.task import Task
 from mjx_hand.errors import InputError
-from mjx_hand.files.array_cache import kept, model_bytes
+from mjx_hand.files.array_cache import cached, model_bytes
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.pytree import pytree
@@ -97,7 +97,7 @@ class TrackingEnv(Env):
     ):
         self.task = Task() if task is None else task
         gains = Gains() if gains is None else gains
-        reference = _kept_reference(demonstrations, hands, self.task.grip_force, gains)
+        reference = _cached_reference(demonstrations, hands, self.task.grip_force, gains)
         self.assisted = self.task.assist > 0
         self.models = demonstration_models(demonstrations, hands, gains=gains, assisted=self.assisted)
         self.engine = make_engine(engine, self.models, self.task.substeps)
@@ -224,11 +224,11 @@ class TrackingEnv(Env):
         mass, inertia = self.tables.inertia[twin.demonstration]
         poses = self.reference.object_pose[twin.demonstration]
         now, wanted = poses[twin.frame], poses[frame]
-        thing, speed = twin.physics.qpos[self.action_size :], twin.physics.qvel[self.action_size :]
+        object_pose, speed = twin.physics.qpos[self.action_size :], twin.physics.qvel[self.action_size :]
         moving = (wanted[:3] - now[:3]) * self.fps
-        turn = quaternion_difference(thing[3:], wanted[3:])
+        turn = quaternion_difference(object_pose[3:], wanted[3:])
         turning = quaternion_difference(now[3:], wanted[3:]) * self.fps
-        force = stiffness * (wanted[:3] - thing[:3]) + damping * (moving - speed[:3])
+        force = stiffness * (wanted[:3] - object_pose[:3]) + damping * (moving - speed[:3])
         torque = stiffness * turn + damping * (turning - speed[3:])
         return jnp.concatenate([mass * force, inertia * torque])
 
@@ -238,9 +238,9 @@ class TrackingEnv(Env):
     def _errors(self, twin: Twin) -> tuple[Array, Array]:
         """The object's distance (m) and angle (rad) from where the demonstration has it."""
         pose = self.reference.object_pose[twin.demonstration, twin.frame]
-        thing = twin.physics.qpos[NUM_WRIST + NUM_HINGES :]
-        turn = quaternion_difference(pose[3:], thing[3:])
-        return jnp.linalg.norm(thing[:3] - pose[:3]), jnp.sqrt(jnp.sum(turn**2) + 1e-12)
+        object_pose = twin.physics.qpos[NUM_WRIST + NUM_HINGES :]
+        turn = quaternion_difference(pose[3:], object_pose[3:])
+        return jnp.linalg.norm(object_pose[:3] - pose[:3]), jnp.sqrt(jnp.sum(turn**2) + 1e-12)
 
     def _start_table(self, reference: Reference) -> PhysicsState:
         """The engine's state at every frame of every demonstration, so that a reset is a look-up."""
@@ -249,7 +249,7 @@ class TrackingEnv(Env):
             states = assisted_replay(self.models, reference, self.task.substeps)
             return {name: np.asarray(a, np.float32) for name, a in zip(("qpos", "qvel", "ctrl"), states, strict=True)}
 
-        replayed = kept(compute, *(model_bytes(m) for m in self.models), reference, self.task.substeps)
+        replayed = cached(compute, *(model_bytes(m) for m in self.models), reference, self.task.substeps)
         qpos, qvel, ctrl = (replayed[name] for name in ("qpos", "qvel", "ctrl"))
         count, frames = qpos.shape[:2]
         variant = np.repeat(np.arange(count, dtype=np.int32), frames)
@@ -259,7 +259,7 @@ class TrackingEnv(Env):
         return jax.tree.map(lambda leaf: leaf.reshape(count, frames, *leaf.shape[1:]), table)
 
 
-def _kept_reference(
+def _cached_reference(
     demonstrations: Sequence[Demonstration], hands: Sequence[RigidHand], grip_force: float | None, gains: Gains
 ) -> Reference:
     def compute() -> dict[str, np.ndarray]:
@@ -267,7 +267,7 @@ def _kept_reference(
         return {field.name: np.asarray(getattr(made, field.name)) for field in dataclasses.fields(made)}
 
     bare = [without_meshes(hand) for hand in hands]
-    arrays = kept(compute, list(demonstrations), bare, grip_force, dataclasses.astuple(gains))
+    arrays = cached(compute, list(demonstrations), bare, grip_force, dataclasses.astuple(gains))
     return Reference(**{name: jnp.asarray(array) for name, array in arrays.items()})
 
 

@@ -27,7 +27,7 @@ from mjx_hand.view.figures import plots
 from mjx_hand.view.report import Film, Headline, Plot, Report, Section, write_report
 from train.evaluate import show
 from train.experiment.evaluate_seeds import POLICY, REPLAY, ZERO, Results, evaluate_seeds, median_and_worst
-from train.experiment.setup import make_world
+from train.experiment.setup import make_setup
 from train.learning.curve import Point
 from train.ppo import train
 from train.reports.evaluation_page import TRACKING, tables, tracking_plot
@@ -49,19 +49,19 @@ def main(config: Config) -> None:
     timings: list[tuple[str, float]] = []
 
     with _stage("demonstrations: performed, recorded with markers, fitted, projected", timings):
-        world = make_world(config, "train")
+        setup = make_setup(config, "train")
     recording = set_folder(config.data, config.demonstrations) / "heldout" / "000.motion.npz"
     with _stage("retargeting a recording", timings):
         errors = _retarget(recording, out / "retargeted.npz")
     with _stage("training", timings):
-        points = train(config, world)
+        points = train(config, setup)
     with _stage("evaluating on held-out demonstrations", timings):
         by_seed = evaluate_seeds([config])
         write_results(by_seed, [config], {})
         results = by_seed[config.seed]
     with _stage("video", timings):
         _, median = median_and_worst({config.seed: results.evaluations[POLICY]})["median"]
-        video = film(results.world, results.rollouts[POLICY], median, out / "twin.mp4", _FILM)
+        video = film(results.setup, results.rollouts[POLICY], median, out / "twin.mp4", _FILM)
     write_report(out / "report.html", _report(config, errors, points, results, video, timings))
     for table in tables(by_seed, config):
         show(table)
@@ -137,7 +137,7 @@ def _report(
         ),
         how=[
             *((name, clock(seconds)) for name, seconds in timings),
-            ("engine", f"{results.world.env.engine.name}, {config.ppo.num_envs} worlds"),
+            ("engine", f"{results.setup.env.engine.name}, {config.ppo.num_envs} worlds"),
             ("seed", str(config.seed)),
             ("machine", f"{processor()}, {len(jax.devices())} {jax.default_backend()} device(s)"),
             ("versions", ", ".join(f"{name} {version(name)}" for name in ("mjx-hand", "mujoco", "jax", "brax"))),

@@ -8,10 +8,10 @@ from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 from train.evaluate import evaluate_and_write
 from train.experiment.evaluate_seeds import shared_folder
-from train.experiment.setup import make_world
+from train.experiment.setup import make_setup
 from train.learning.curve import is_finished, load_curve
 from train.ppo import train
-from train.reports.evaluation_record import kept_results
+from train.reports.evaluation_record import cached_results
 from train.reports.results_table import Experiment
 from train.settings.config import Config
 
@@ -76,13 +76,13 @@ def measure(configs: Sequence[Config]) -> Experiment:
     """Train and evaluate one experiment; what was done before with the same settings is taken as it is."""
     finished = all(is_finished(config, load_curve(config.out)) for config in configs)
     folder = shared_folder(configs)
-    summary = kept_results(configs) if finished and not configs[0].fresh else None
+    summary = cached_results(configs) if finished and not configs[0].fresh else None
     if summary is None:
-        world = make_world(configs[0], "train")
+        setup = make_setup(configs[0], "train")
         for config in configs:
-            train(config, world)
+            train(config, setup)
         evaluate_and_write(configs)
-        summary = kept_results(configs)
+        summary = cached_results(configs)
         if summary is None:
             raise InputError(f"{folder}: policies changed while they were evaluated; run one command at a time there")
     else:

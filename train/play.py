@@ -11,9 +11,9 @@ from pathlib import Path
 
 from mjx_hand.errors import InputError
 from mjx_hand.view.browser.viewer import Viewer
-from train.experiment.bundled_policies import included_policy, included_world
+from train.experiment.bundled_policies import bundled_policy, bundled_setup
 from train.experiment.evaluate_seeds import median_and_worst
-from train.experiment.setup import World, make_world, rolled_out
+from train.experiment.setup import TrackingSetup, make_setup, rolled_out
 from train.learning.unstable import load_unstable
 from train.settings.config import Config, command
 from train.view.play_scene import rollout_scene
@@ -36,8 +36,8 @@ def unstable_viewer(config: Config) -> Viewer:
         InputError: no such file, or one of other demonstrations.
     """
     unstable = load_unstable(config.play.unstable)
-    world = make_world(config, "train")
-    return Viewer(unstable_scene(unstable, world, config.name), config.play.port)
+    setup = make_setup(config, "train")
+    return Viewer(unstable_scene(unstable, setup, config.name), config.play.port)
 
 
 def rollout_viewer(config: Config) -> Viewer:
@@ -46,8 +46,8 @@ def rollout_viewer(config: Config) -> Viewer:
     Raises:
         InputError: no such demonstration, or what `chosen_checkpoint` and `Viewer` refuse.
     """
-    config, world = _world(config)
-    _, rollouts, scores = rolled_out(config, world)
+    config, setup = _setup(config)
+    _, rollouts, scores = rolled_out(config, setup)
     errors = scores.scores["tracking_error_cm"]
     index = config.play.demonstration
     if index is None:
@@ -56,18 +56,18 @@ def rollout_viewer(config: Config) -> Viewer:
         raise InputError(f"play.demonstration is {index}; there are {len(errors)}, numbered from 0")
     outcome = scores.failure[index] or "followed to the end"
     title = f"{config.name} {index}: {outcome}, {errors[index]:.2f} cm"
-    scene = rollout_scene(world.demonstrations[index], rollouts, index, world.hands[index], title)
+    scene = rollout_scene(setup.demonstrations[index], rollouts, index, setup.hands[index], title)
     return Viewer(scene, config.play.port)
 
 
-def _world(config: Config) -> tuple[Config, World]:
+def _setup(config: Config) -> tuple[Config, TrackingSetup]:
     """The demonstrations to play, and the configuration with the policy to play them."""
-    included = included_policy(config.name)
+    included = bundled_policy(config.name)
     if config.checkpoint or included is None or (Path(config.out) / "best.npz").is_file():
-        return config, make_world(config, "heldout")
+        return config, make_setup(config, "heldout")
     print(f"nothing is trained in {config.out}: playing the policy that comes with mjx-hand", flush=True)
     config = dataclasses.replace(config, checkpoint=str(included))
-    return config, included_world(config) if config.play.demonstration is None else make_world(config, "heldout")
+    return config, bundled_setup(config) if config.play.demonstration is None else make_setup(config, "heldout")
 
 
 def main(config: Config) -> None:

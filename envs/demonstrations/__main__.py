@@ -25,7 +25,7 @@ from envs.demonstrations.quality import check_part
 from envs.demonstrations.scripted.perform import OUTCOMES
 from envs.demonstrations.scripted.trials import NO_POSTURE, SPARE
 from envs.demonstrations.twin_hands import twins
-from envs.settings import made_of
+from envs.settings import from_dict
 from mjx_hand.cli.output import print_table
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
@@ -57,7 +57,7 @@ def settings_of(arguments: Sequence[str]) -> tuple[SetSettings, Path]:
         data = OmegaConf.to_container(OmegaConf.create(files[experiment].read_text()))
         overrides = OmegaConf.from_dotlist([f"{key.removeprefix('data.')}={value}" for key, value in given.items()])
         merged = OmegaConf.merge(schema, cast(dict, data).get("data", {}), overrides)
-        return made_of(SetSettings, OmegaConf.to_container(merged, throw_on_missing=True)), Path(root)
+        return from_dict(SetSettings, OmegaConf.to_container(merged, throw_on_missing=True)), Path(root)
     except OmegaConfBaseException as error:
         line = str(error).strip().splitlines()[0]
         raise InputError(f"{line}; python -m train.ppo --cfg job lists the options of data") from None
@@ -75,7 +75,7 @@ def main(arguments: Sequence[str]) -> None:
     """Make the set where it is missing, print its tables, write its picture; `config=all` does so for each type."""
     settings, root = settings_of(arguments)
     enable_compile_cache()
-    for single in settings.of_each_type():
+    for single in settings.expand_types():
         _make_and_show(single, root)
 
 

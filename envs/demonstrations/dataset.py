@@ -79,7 +79,7 @@ class SetSettings:
         if self.seed < 0:
             raise InputError(f"data.seed is {self.seed}; it must not be negative")
 
-    def of_each_type(self) -> tuple["SetSettings", ...]:
+    def expand_types(self) -> tuple["SetSettings", ...]:
         """The settings of the single sets that these stand for: one, or one of every grasp type."""
         names = grasp_names() if self.grasp == ALL else [self.grasp]
         return tuple(dataclasses.replace(self, grasp=name) for name in names)
@@ -87,11 +87,11 @@ class SetSettings:
 
 def set_folder(settings: SetSettings, root: str | Path) -> Path:
     """Where a set of these settings lives below `root`: its name carries a digest of all settings and of the type."""
-    made_of: list[Any] = [_VERSION, told_apart_by(settings)]
-    recording = made_of[1].pop("recording")
+    ingredients: list[Any] = [_VERSION, fingerprint(settings)]
+    recording = ingredients[1].pop("recording")
     if settings.grasp == RECORDED:
         files = _recording_files(settings.recording)
-        made_of = [
+        ingredients = [
             _RECORDED_VERSION,
             settings.seed,
             recording,
@@ -100,14 +100,14 @@ def set_folder(settings: SetSettings, root: str | Path) -> Path:
     else:
         grasp = dataclasses.asdict(grasp_type(settings.grasp))
         del grasp["grip_force"]  # it is the twin's: the same demonstrations are made whatever it is
-        made_of.append(grasp)
-    content = json.dumps(made_of, sort_keys=True)
+        ingredients.append(grasp)
+    content = json.dumps(ingredients, sort_keys=True)
     return Path(root) / f"{settings.grasp}-{hashlib.sha256(content.encode()).hexdigest()[:10]}"
 
 
-def told_apart_by(settings: SetSettings) -> dict[str, Any]:
-    """All settings that tell sets apart, as in `CaptureSettings.told_apart_by`."""
-    return dataclasses.asdict(settings) | {"capture": settings.capture.told_apart_by()}
+def fingerprint(settings: SetSettings) -> dict[str, Any]:
+    """All settings that tell sets apart, as in `CaptureSettings.fingerprint`."""
+    return dataclasses.asdict(settings) | {"capture": settings.capture.fingerprint()}
 
 
 def make_set(settings: SetSettings, root: str | Path, report: Report = lambda what, share: None) -> Path:

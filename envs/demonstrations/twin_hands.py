@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from mjx_hand.files.array_cache import kept
+from mjx_hand.files.array_cache import cached
 from mjx_hand.hand.load import load_hand
 from mjx_hand.hand.model import HandModel
 from mjx_hand.motion.demonstration import Demonstration
@@ -21,7 +21,7 @@ def twins(demonstrations: Sequence[Demonstration]) -> list[RigidHand]:
     model = load_hand(side=demonstrations[0].motion.side)
     shapes = {d.shape.tobytes(): d.shape for d in demonstrations}
     built = list(shapes.values())
-    arrays = kept(lambda: _arrays([build_rigid_hand(model, shape) for shape in built]), "twins", model, built)
+    arrays = cached(lambda: _arrays([build_rigid_hand(model, shape) for shape in built]), "twins", model, built)
     hands = dict(zip(shapes, _hands(arrays, model), strict=True))
     return [with_hinges_of(d, hands[d.shape.tobytes()]) for d in demonstrations]
 

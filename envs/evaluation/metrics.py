@@ -97,7 +97,7 @@ def add_auc(rollouts: Rollouts, objects: Sequence[ObjectDescription]) -> Float[n
         objects: each demonstration's object, by the numbers in `rollouts.demonstration`.
     """
     area = np.zeros(len(rollouts.demonstration))
-    points = [surface_points(thing, ADD_POINTS) for thing in objects]
+    points = [surface_points(description, ADD_POINTS) for description in objects]
     for row, which in enumerate(rollouts.demonstration):
         frames = rollouts.counted[row]
         achieved = _placed(points[which], rollouts.object_pose[row, frames])

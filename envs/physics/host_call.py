@@ -30,7 +30,7 @@ _numbers = itertools.count()
 _functions: dict[int, Callable[..., Sequence[np.ndarray]]] = {}
 
 
-class HostFunction:
+class HostCallback:
     """A pure function of NumPy arrays with leading batch axes, to be called within compiled functions.
 
     It is kept until the process ends. Numbers are given in the order of making, so a program that is started again
@@ -54,7 +54,7 @@ class HostFunction:
 
 
 def call_host(number: Int[Array, ""], shapes: tuple[jax.ShapeDtypeStruct, ...], *args: Array) -> tuple[Array, ...]:
-    """Call the `HostFunction` of this number within a JAX function.
+    """Call the `HostCallback` of this number within a JAX function.
 
     Args:
         number: of the function; the same for all elements of a batch.

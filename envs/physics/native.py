@@ -19,7 +19,7 @@ from jaxtyping import Array, Float, Int
 from mujoco import batch
 
 from envs.physics.engine import PhysicsState
-from envs.physics.host_call import HostFunction, call_host
+from envs.physics.host_call import HostCallback, call_host
 from envs.physics.solver import gauss_seidel
 
 # Fields of the integration state that one step hands to the next, in its order and at the front of its rows; what comes
@@ -87,7 +87,7 @@ class NativeEngine:
             jax.ShapeDtypeStruct((model.nsensordata,), jnp.float32),
             jax.ShapeDtypeStruct((), jnp.float32),
         )
-        self.tables = jnp.array([HostFunction(f).number for f in (self._host_reset, self._host_step)], jnp.int32)
+        self.tables = jnp.array([HostCallback(f).number for f in (self._host_reset, self._host_step)], jnp.int32)
 
     def with_tables(self, tables: Any) -> "NativeEngine":
         other = copy.copy(self)

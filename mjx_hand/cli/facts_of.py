@@ -62,12 +62,16 @@ def robot_motion(found: RobotMotion) -> Facts:
 
 def demonstration(found: Demonstration) -> Facts:
     """Of a demonstration."""
-    thing = found.object
-    size = " x ".join(f"{1e3 * s:.0f}" for s in thing.size if s > 0)
-    kind = f"{thing.kind} of {len(thing.hulls)} convex pieces" if thing.kind == "mesh" else thing.kind
+    description = found.object
+    size = " x ".join(f"{1e3 * s:.0f}" for s in description.size if s > 0)
+    kind = (
+        f"{description.kind} of {len(description.hulls)} convex pieces"
+        if description.kind == "mesh"
+        else description.kind
+    )
     return (
         ("grasp", found.grasp),
-        ("object", f"{kind}, {size} mm (half extents or radius), {1e3 * thing.mass:.0f} g"),
+        ("object", f"{kind}, {size} mm (half extents or radius), {1e3 * description.mass:.0f} g"),
         *joint_motion(found.motion),
     )
 

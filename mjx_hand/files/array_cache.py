@@ -23,7 +23,7 @@ _CODE = tuple(Path(__file__).parents[2] / name for name in ("mjx_hand", "envs"))
 _LIBRARIES = ("jax", "jaxlib", "mujoco", "numpy", "scipy")
 
 
-def kept(compute: Callable[[], Mapping[str, np.ndarray]], *ingredients: Any) -> Mapping[str, np.ndarray]:
+def cached(compute: Callable[[], Mapping[str, np.ndarray]], *ingredients: Any) -> Mapping[str, np.ndarray]:
     """What `compute` gives, or gave in an earlier start with the same ingredients, code and libraries.
 
     They are kept where `mjx_hand.compile_cache` keeps compiled functions, if it does; that folder is safe to delete.

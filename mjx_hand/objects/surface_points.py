@@ -13,28 +13,28 @@ _SPARE = 8  # points on a mesh's pieces for each that is wanted
 _OFF = 1e-4  # m
 
 
-def surface_points(thing: ObjectDescription, count: int = 500) -> Float[np.ndarray, "{count} 3"]:
+def surface_points(description: ObjectDescription, count: int = 500) -> Float[np.ndarray, "{count} 3"]:
     """Points (m, object's frame) spread evenly over the surface: a Halton sequence, so without chance.
 
     Raises:
         InputError: an unknown kind, or fewer than one point.
     """
-    if thing.kind not in OBJECT_KINDS:
-        raise InputError(f"object kind {thing.kind!r} is not known; valid: {', '.join(OBJECT_KINDS)}")
+    if description.kind not in OBJECT_KINDS:
+        raise InputError(f"object kind {description.kind!r} is not known; valid: {', '.join(OBJECT_KINDS)}")
     if count < 1:
         raise InputError(f"count is {count}; give at least 1 point")
     halton = qmc.Halton(d=3, scramble=False)
     halton.fast_forward(1)  # its first point is a corner
     where, u, v = halton.random(count).T
-    size = np.asarray(thing.size, dtype=float)
-    if thing.kind == "sphere":
+    size = np.asarray(description.size, dtype=float)
+    if description.kind == "sphere":
         return size[0] * _on_unit_sphere(u, v)
-    if thing.kind == "cylinder":
+    if description.kind == "cylinder":
         return _on_cylinder(size[0], size[1], where, u, v)
-    if thing.kind == "capsule":
+    if description.kind == "capsule":
         return _on_capsule(size[0], size[1], where, u, v)
-    if thing.kind == "mesh":
-        return _on_pieces(thing.hulls, count)
+    if description.kind == "mesh":
+        return _on_pieces(description.hulls, count)
     return _on_box(size, where, u, v)
 
 

@@ -69,11 +69,11 @@ def test_joint_motion_and_demonstration(tmp_path, capsys):
     assert f"next: mjx-hand view {tmp_path / 'angles.npz'}" in text
     pose = np.zeros((FRAMES, 7))
     pose[:, 3] = 1
-    thing = ObjectDescription(size=np.array([0.02, 0.04, 0.0]), mass=0.08, friction=1.0, kind="cylinder")
+    description = ObjectDescription(size=np.array([0.02, 0.04, 0.0]), mass=0.08, friction=1.0, kind="cylinder")
     demonstration = Demonstration(
         motion=joint_motion(),
         object_pose=pose,
-        object=thing,
+        object=description,
         support=np.zeros((0, 3)),
         support_position=np.zeros((0, 3)),
         shape=np.zeros(10),

@@ -21,9 +21,9 @@ def in_hand(demonstrations, env):
     """The object's pose in the first demonstration's wrist frame, every frame."""
     d = demonstrations[0]
     hand = Rotation.from_quat(d.motion.wrist_quaternion, scalar_first=True)
-    thing = Rotation.from_quat(d.object_pose[:, 3:], scalar_first=True)
+    object_rotation = Rotation.from_quat(d.object_pose[:, 3:], scalar_first=True)
     position = hand.inv().apply(d.object_pose[:, :3] - d.motion.wrist_position)
-    return jnp.asarray((hand.inv() * thing).as_matrix(), jnp.float32), jnp.asarray(position, jnp.float32)
+    return jnp.asarray((hand.inv() * object_rotation).as_matrix(), jnp.float32), jnp.asarray(position, jnp.float32)
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +58,7 @@ def test_more_force_presses_harder_in_mujoco(demonstrations, hands, offsets, in_
     """The sum of the contact forces that the object feels from the fingers grows with the force asked for."""
     d, frame = demonstrations[0], int(lifted[0][20])
     model = demonstration_model(d, hands[0])
-    thing = model.geom(OBJECT).id
+    object_id = model.geom(OBJECT).id
     model.body_mass[model.body(OBJECT).id] *= 1000  # it stays where it is
     model.body_inertia[model.body(OBJECT).id] *= 1000
     mujoco.mj_setConst(model, mujoco.MjData(model))
@@ -74,7 +74,7 @@ def test_more_force_presses_harder_in_mujoco(demonstrations, hands, offsets, in_
             mujoco.mj_step(model, data)
         wrench, total = np.zeros(6), 0.0
         for k in range(data.ncon):
-            assert thing in data.contact[k].geom
+            assert object_id in data.contact[k].geom
             mujoco.mj_contactForce(model, data, k, wrench)
             total += wrench[0]
         pressed.append(total)

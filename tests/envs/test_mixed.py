@@ -92,7 +92,7 @@ def test_engines_that_compile_kinds_in_name_the_one_that_does_not(mixed, hands, 
 def test_a_mesh_among_simple_shapes_is_refused(mixed, hands):
     """MuJoCo's batch would, with a message about the layout of its data."""
     corners = 0.017 * np.array([[[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]])
-    thing = ObjectDescription(kind="mesh", size=np.full(3, 0.017), mass=0.1, friction=1.0, hulls=corners)
-    models = demonstration_models([mixed[0], replace(mixed[1], object=thing)], hands)
+    description = ObjectDescription(kind="mesh", size=np.full(3, 0.017), mass=0.1, friction=1.0, hulls=corners)
+    models = demonstration_models([mixed[0], replace(mixed[1], object=description)], hands)
     with pytest.raises(InputError, match=r"model 1 has .*simple shapes, or all of one mesh"):
         make_engine("native", models, 5)

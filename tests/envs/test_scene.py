@@ -34,16 +34,16 @@ def test_joints_and_actuators_run_in_one_order(model):
 
 def test_only_the_object_is_touched(model):
     """Every pair that MuJoCo would test has the object in it: no finger meets a finger, the block or the table."""
-    thing = model.geom(OBJECT).id
+    object_id = model.geom(OBJECT).id
     ground = {model.geom(f"{SUPPORT}0").id, model.geom(TABLE).id}
     partners = set()
     for i in range(model.ngeom):
         for j in range(i + 1, model.ngeom):
             kind, meets = model.geom_contype, model.geom_conaffinity
             if kind[i] & meets[j] or kind[j] & meets[i]:
-                assert thing in (i, j)
-                partners |= {i, j} - {thing}
-    hand = set(range(model.ngeom)) - ground - {thing}
+                assert object_id in (i, j)
+                partners |= {i, j} - {object_id}
+    hand = set(range(model.ngeom)) - ground - {object_id}
     assert len(hand) == 20
     assert partners == ground | hand
 
@@ -57,11 +57,11 @@ def test_a_hand_pushed_through_table_and_itself_touches_nothing(model):
 
 
 def test_the_object_has_the_mass_friction_and_size_that_were_asked_for(model, demonstrations):
-    thing = demonstrations[0].object
-    assert model.body(OBJECT).mass[0] == pytest.approx(thing.mass)
-    np.testing.assert_allclose(model.geom(OBJECT).size, thing.size)
+    description = demonstrations[0].object
+    assert model.body(OBJECT).mass[0] == pytest.approx(description.mass)
+    np.testing.assert_allclose(model.geom(OBJECT).size, description.size)
     for name in (OBJECT, f"{SUPPORT}0", TABLE):
-        assert model.geom(name).friction[0] == pytest.approx(thing.friction)
+        assert model.geom(name).friction[0] == pytest.approx(description.friction)
 
 
 def test_a_cube_rests_on_its_block(model, demonstrations):
@@ -122,13 +122,15 @@ def test_an_unknown_kind_of_object_is_refused(hands):
 def test_every_grasp_type_has_a_scene_that_mjx_can_run(name, hands):
     """MJX lacks some pairs of shapes, a cylinder on a box among them."""
     grasp = grasp_type(name)
-    thing = ObjectDescription(kind=grasp.object_kind, size=np.array(grasp.object_size[0]), mass=0.1, friction=1.0)
-    scene = scene_model(hands[0], thing, *support_boxes(grasp), np.array(grasp.wrist_rotation))
+    description = ObjectDescription(kind=grasp.object_kind, size=np.array(grasp.object_size[0]), mass=0.1, friction=1.0)
+    scene = scene_model(hands[0], description, *support_boxes(grasp), np.array(grasp.wrist_rotation))
     mjx.put_model(scene, impl="jax")
     data = mujoco.MjData(scene)
     data.qpos[2], data.ctrl[2] = 0.5, 0.5
     rotation = Rotation.from_matrix(np.array(grasp.object_rotation))
-    height = grasp.rest + np.abs(rotation.as_matrix()[2]) @ np.asarray(half_extents(grasp.object_kind, thing.size))
+    height = grasp.rest + np.abs(rotation.as_matrix()[2]) @ np.asarray(
+        half_extents(grasp.object_kind, description.size)
+    )
     data.qpos[-7:] = [0.0, 0.0, height, *rotation.as_quat(scalar_first=True)]
     for _ in range(125):
         mujoco.mj_step(scene, data)

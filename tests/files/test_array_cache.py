@@ -9,7 +9,7 @@ import pytest
 
 from mjx_hand.errors import InputError
 from mjx_hand.files import array_cache as module
-from mjx_hand.files.array_cache import kept, model_bytes
+from mjx_hand.files.array_cache import cached, model_bytes
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ class Counted:
 def test_found_again_exactly(folder):
     compute = Counted()
     ingredients = ("x", 3, None, (jnp.arange(4.0), {"b": b"12"}))
-    first, second = kept(compute, *ingredients), kept(compute, *ingredients)
+    first, second = cached(compute, *ingredients), cached(compute, *ingredients)
     assert compute.calls == 1
     assert first.keys() == second.keys()
     for name in first:
@@ -44,16 +44,16 @@ def test_found_again_exactly(folder):
 )
 def test_every_ingredient_counts(folder, other):
     compute = Counted()
-    kept(compute, "x", 3, np.arange(4.0))
-    kept(compute, *other)
+    cached(compute, "x", 3, np.arange(4.0))
+    cached(compute, *other)
     assert compute.calls == 2
 
 
 def test_code_and_libraries_count(folder, monkeypatch):
     compute = Counted()
-    kept(compute)
+    cached(compute)
     monkeypatch.setattr(module, "version", lambda name: "another")
-    kept(compute)
+    cached(compute)
     assert compute.calls == 2
 
 
@@ -66,14 +66,14 @@ def test_a_model_is_an_ingredient_with_all_its_numbers(folder):
 @pytest.mark.parametrize("damage", ["cut", "flip"])
 def test_a_damaged_file_is_made_anew(folder, damage):
     compute = Counted()
-    kept(compute, "x")
+    cached(compute, "x")
     (path,) = folder.glob("*.npz")
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 0xFF
     path.write_bytes(content[:100] if damage == "cut" else content)
-    kept(compute, "x")
+    cached(compute, "x")
     assert compute.calls == 2
-    kept(compute, "x")
+    cached(compute, "x")
     assert compute.calls == 2
 
 
@@ -81,15 +81,15 @@ def test_the_longest_unused_go(folder, monkeypatch):
     monkeypatch.setattr(module, "_MOST", 2)
     compute = Counted()
     for k in range(2):
-        kept(compute, k)
+        cached(compute, k)
     for age, path in enumerate(sorted(folder.glob("*.npz"), key=lambda p: p.stat().st_mtime_ns)):
         os.utime(path, (1000 + age, 1000 + age))
-    kept(compute, 0)  # used: the other one is the oldest now
-    kept(compute, 2)
+    cached(compute, 0)  # used: the other one is the oldest now
+    cached(compute, 2)
     assert len(list(folder.iterdir())) == 2
-    kept(compute, 0)
+    cached(compute, 0)
     assert compute.calls == 3
-    kept(compute, 1)
+    cached(compute, 1)
     assert compute.calls == 4
 
 
@@ -97,8 +97,8 @@ def test_nothing_is_written_without_a_cache(monkeypatch, tmp_path):
     monkeypatch.setattr(module, "_cache", lambda: None)
     monkeypatch.chdir(tmp_path)
     compute = Counted()
-    kept(compute)
-    kept(compute)
+    cached(compute)
+    cached(compute)
     assert compute.calls == 2
     assert not list(tmp_path.iterdir())
 
@@ -107,4 +107,4 @@ def test_a_folder_that_cannot_be_written_is_an_input_error(monkeypatch, tmp_path
     (tmp_path / "file").touch()
     monkeypatch.setattr(module, "_cache", lambda: str(tmp_path / "file"))
     with pytest.raises(InputError, match="cannot write"):
-        kept(Counted())
+        cached(Counted())

@@ -43,7 +43,7 @@ def hulls(angle):
 
 
 @pytest.fixture(scope="module")
-def thing(hulls):
+def described(hulls):
     return ObjectDescription(kind="mesh", size=np.abs(hulls).max(axis=(0, 1)), mass=0.2, friction=0.9, hulls=hulls)
 
 
@@ -67,8 +67,8 @@ def test_decomposition_is_the_same_every_time(angle, hulls):
     np.testing.assert_array_equal(convex_pieces(np.asarray(angle.vertices), np.asarray(angle.faces)), hulls)
 
 
-def test_surface_points_lie_on_the_outside_alone(thing, angle):
-    points = surface_points(thing, 1000)
+def test_surface_points_lie_on_the_outside_alone(described, angle):
+    points = surface_points(described, 1000)
     assert points.shape == (1000, 3)
     assert trimesh.proximity.closest_point(angle, points)[1].max() < 0.001
     np.testing.assert_allclose(
@@ -76,10 +76,10 @@ def test_surface_points_lie_on_the_outside_alone(thing, angle):
     )
 
 
-def test_physics_has_its_mass_and_its_shape(thing):
+def test_physics_has_its_mass_and_its_shape(described):
     model = load_hand()
     hand = build_rigid_hand(model, np.zeros(model.num_shape))
-    scene = scene_model(hand, thing, np.zeros((0, 3)), np.zeros((0, 3)), np.eye(3))
+    scene = scene_model(hand, described, np.zeros((0, 3)), np.zeros((0, 3)), np.eye(3))
     body = scene.body(OBJECT)
     whole = trimesh.Trimesh(*_joined())
     assert body.mass[0] == pytest.approx(0.2)

@@ -14,7 +14,7 @@ MESHES = {
 }
 
 
-def thing(kind: str, size: tuple[float, float, float]) -> ObjectDescription:
+def described(kind: str, size: tuple[float, float, float]) -> ObjectDescription:
     return ObjectDescription(kind=kind, size=np.array(size), mass=0.1, friction=0.9)
 
 
@@ -29,7 +29,7 @@ CASES = [
 
 @pytest.mark.parametrize(("kind", "size"), CASES)
 def test_points_lie_on_the_surface_and_spread_evenly(kind, size):
-    points = surface_points(thing(kind, size), 2000)
+    points = surface_points(described(kind, size), 2000)
     mesh = MESHES[kind](np.array(size))
     scale = max(size)
     off = trimesh.proximity.closest_point(mesh, points)[1]
@@ -43,12 +43,12 @@ def test_points_lie_on_the_surface_and_spread_evenly(kind, size):
 
 @pytest.mark.parametrize(("kind", "size"), CASES)
 def test_points_are_the_same_every_time(kind, size):
-    np.testing.assert_array_equal(surface_points(thing(kind, size)), surface_points(thing(kind, size)))
-    assert surface_points(thing(kind, size)).shape == (500, 3)
+    np.testing.assert_array_equal(surface_points(described(kind, size)), surface_points(described(kind, size)))
+    assert surface_points(described(kind, size)).shape == (500, 3)
 
 
 def test_bad_input_is_refused():
     with pytest.raises(InputError, match="object kind 'cone' is not known; valid: box, sphere, cylinder"):
-        surface_points(thing("cone", (1.0, 1.0, 1.0)))
+        surface_points(described("cone", (1.0, 1.0, 1.0)))
     with pytest.raises(InputError, match="count is 0"):
-        surface_points(thing("box", (1.0, 1.0, 1.0)), 0)
+        surface_points(described("box", (1.0, 1.0, 1.0)), 0)

@@ -13,7 +13,7 @@ from envs.demonstrations.dataset import SetSettings, make_set
 from envs.evaluation.roll_out import make_roll_out
 from envs.parallel import ParallelEnv
 from envs.tracking import TrackingEnv
-from train.experiment.setup import World, make_world
+from train.experiment.setup import TrackingSetup, make_setup
 from train.learning.curve import Point
 from train.learning.learner import Learner
 from train.settings.config import Config
@@ -74,11 +74,11 @@ def compiled_once() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def world(tiny: Config) -> World:
-    return make_world(tiny, "train")
+def setup(tiny: Config) -> TrackingSetup:
+    return make_setup(tiny, "train")
 
 
 @pytest.fixture(scope="session")
-def trained(tiny: Config, world: World) -> tuple[Path, list[Point]]:
+def trained(tiny: Config, setup: TrackingSetup) -> tuple[Path, list[Point]]:
     """The folder of a finished training, and what it returned."""
-    return Path(tiny.out), train.ppo.train(tiny, world)
+    return Path(tiny.out), train.ppo.train(tiny, setup)

@@ -21,7 +21,7 @@ from train.learning.checkpoint import load_checkpoint
 from train.learning.curve import Point
 from train.reports import evaluation_record
 from train.reports.evaluation_page import tables
-from train.reports.evaluation_record import kept_results
+from train.reports.evaluation_record import cached_results
 from train.settings.config import Config
 from train.view import video
 
@@ -56,7 +56,7 @@ def written(results: dict[int, Results], configs: list[Config]) -> Path:
     """Everything that the command writes, with bytes for videos: `test_video` draws some."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(evaluate, "evaluate_seeds", lambda _: results)
-        patched.setattr(video, "side_by_side", lambda world, rollouts, index, path: Path(path).write_bytes(b"film"))
+        patched.setattr(video, "side_by_side", lambda setup, rollouts, index, path: Path(path).write_bytes(b"film"))
         folder, _ = evaluate_and_write(configs)
     return folder
 
@@ -147,19 +147,19 @@ def test_without_a_renderer_the_page_says_why(
 def test_what_was_evaluated_is_known_again_until_something_changes(
     written: Path, configs: list[Config], tmp_path, monkeypatch
 ):
-    kept = kept_results(configs)
+    kept = cached_results(configs)
     assert kept is not None
     assert kept["experiment"] == "tiny"
-    assert kept_results(configs[:1]) is None, "that was never evaluated alone"
+    assert cached_results(configs[:1]) is None, "that was never evaluated alone"
     longer = [dataclasses.replace(c, ppo=dataclasses.replace(c.ppo, num_timesteps=999)) for c in configs]
-    assert kept_results(longer) is None
+    assert cached_results(longer) is None
     curve = Path(configs[1].out) / "curve.csv"
     curve.write_text("steps\n")
-    assert kept_results(configs) is None, "it was trained further"
+    assert cached_results(configs) is None, "it was trained further"
     curve.unlink()
-    assert kept_results(configs) == kept
+    assert cached_results(configs) == kept
     monkeypatch.setattr(evaluation_record, "version", lambda _: "another")
-    assert kept_results(configs) is None
+    assert cached_results(configs) is None
 
 
 def test_results_of_several_seeds_go_above_their_folders(tiny: Config):

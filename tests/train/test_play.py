@@ -12,7 +12,7 @@ from mjx_hand.motion.resample import quaternion_matrices
 from mjx_hand.view.browser.scene import Layer, MeshLayer
 from mjx_hand.view.browser.viewer import Viewer
 from tests.view.browser.chromium import find_chromium, page
-from train.experiment.setup import chosen_checkpoint, make_world
+from train.experiment.setup import chosen_checkpoint, make_setup
 from train.learning.curve import Point
 from train.learning.policy import deterministic_policy
 from train.play import viewer
@@ -36,19 +36,21 @@ def layer(shown: Viewer, name: str) -> MeshLayer:
 
 
 def test_it_shows_where_twin_and_object_were(playing: Viewer, tiny: Config):
-    world = make_world(tiny, "heldout")
-    checkpoint = chosen_checkpoint(tiny, world.env.observation_size)
-    policy = deterministic_policy(tiny.ppo, world.env.observation_size, world.env.action_size)
-    rollouts = make_roll_out(world.env, world.hands, policy)(checkpoint.policy)
+    setup = make_setup(tiny, "heldout")
+    checkpoint = chosen_checkpoint(tiny, setup.env.observation_size)
+    policy = deterministic_policy(tiny.ppo, setup.env.observation_size, setup.env.action_size)
+    rollouts = make_roll_out(setup.env, setup.hands, policy)(checkpoint.policy)
     frames = playing.scene.num_frames
     assert frames == rollouts.counted[0].sum()
     np.testing.assert_allclose(layer(playing, "twin").transforms[..., :3, 3], rollouts.joints[0, :frames], atol=1e-5)
     np.testing.assert_allclose(
         layer(playing, "demonstration").transforms[..., :3, 3], rollouts.joints_reference[0, :frames], atol=5e-3
     )
-    thing = layer(playing, "object").transforms[:, 0]
-    np.testing.assert_allclose(thing[:, :3, 3], rollouts.object_pose[0, :frames, :3], atol=1e-6)
-    np.testing.assert_allclose(thing[:, :3, :3], quaternion_matrices(rollouts.object_pose[0, :frames, 3:]), atol=1e-5)
+    object_transforms = layer(playing, "object").transforms[:, 0]
+    np.testing.assert_allclose(object_transforms[:, :3, 3], rollouts.object_pose[0, :frames, :3], atol=1e-6)
+    np.testing.assert_allclose(
+        object_transforms[:, :3, :3], quaternion_matrices(rollouts.object_pose[0, :frames, 3:]), atol=1e-5
+    )
     away = np.linalg.norm(rollouts.object_pose[0, :frames, :3] - rollouts.object_reference[0, :frames, :3], axis=1)
     np.testing.assert_allclose(playing.scene.curves[0].values, 100 * away, atol=1e-3)
     assert playing.scene.title.startswith("tiny 0: ")

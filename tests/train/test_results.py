@@ -10,10 +10,10 @@ import pytest
 from envs.evaluation.failure import FAILURES
 from mjx_hand.errors import InputError
 from train import experiments, results
-from train.experiment.setup import World
+from train.experiment.setup import TrackingSetup
 from train.learning.curve import Point, is_finished, load_curve, minutes_to_learn
 from train.ppo import _write_curve
-from train.reports.evaluation_record import made_of
+from train.reports.evaluation_record import evaluation_fingerprint
 from train.reports.published import PAPER
 from train.reports.results_page import write_results_page
 from train.reports.results_table import FIVE, Experiment, failures_table, results_table
@@ -202,17 +202,17 @@ def work(monkeypatch, tmp_path) -> list[str]:
     done: list[str] = []
     monkeypatch.chdir(tmp_path)
 
-    def train(config: Config, world: World) -> None:
+    def train(config: Config, setup: TrackingSetup) -> None:
         done.append(f"train {config.name} {config.seed}")
         Path(config.out).mkdir(parents=True, exist_ok=True)
         _write_curve(curve(0.1, 0.96, minutes=config.seed + 1.0), Path(config.out) / "curve.csv")
 
     def evaluate(configs: Sequence[Config]) -> None:
         done.append(f"evaluate {configs[0].name}")
-        content = summary(configs[0].data.grasp, [1.0] * len(configs)) | {"made_of": made_of(configs)}
+        content = summary(configs[0].data.grasp, [1.0] * len(configs)) | {"made_of": evaluation_fingerprint(configs)}
         (Path(configs[0].out).parent / "evaluation.json").write_text(json.dumps(content))
 
-    monkeypatch.setattr(experiments, "make_world", lambda config, part: None)
+    monkeypatch.setattr(experiments, "make_setup", lambda config, part: None)
     monkeypatch.setattr(experiments, "train", train)
     monkeypatch.setattr(experiments, "evaluate_and_write", evaluate)
     monkeypatch.setattr(experiments, "enable_compile_cache", lambda: None)
@@ -236,10 +236,10 @@ def test_what_is_done_is_kept_and_the_rest_goes_on(work: list[str], capsys):
 
 
 def test_one_experiment_that_is_done_is_shown_while_others_wait(work: list[str], monkeypatch):
-    def train(config: Config, world: World) -> None:
+    def train(config: Config, setup: TrackingSetup) -> None:
         if config.name == "lateral":
             raise InputError("the disk is full")
-        first(config, world)
+        first(config, setup)
 
     first = experiments.train
     monkeypatch.setattr(experiments, "train", train)
@@ -252,7 +252,7 @@ def test_ctrl_c_ends_in_one_line(work: list[str], monkeypatch, capsys):
     def stop(config: Config, part: str) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(experiments, "make_world", stop)
+    monkeypatch.setattr(experiments, "make_setup", stop)
     assert results.main(["names=[pinch]", "seeds=[0,1]", "ppo.num_timesteps=1000"]) == 130
     assert capsys.readouterr().err == "\nresults: stopped; the same command goes on from here\n"
 

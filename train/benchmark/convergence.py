@@ -30,7 +30,7 @@ from train.benchmark.contestants import make_script
 from train.benchmark.engines import config
 from train.benchmark.report_files import write_report
 from train.benchmark.solver import CHOSEN, SWEEP, Settings, newton
-from train.experiment.setup import make_world
+from train.experiment.setup import make_setup
 from train.reports.machine import machine
 
 SCHEMA = "mjx-hand/benchmark-convergence/1"
@@ -93,7 +93,7 @@ def report(options: Options) -> list[str]:
         counter(len(grasps) * (options.runs * len(COMPARED) + 1), "stepping") as advance,
     ):
         for grasp in grasps:
-            env = make_world(config("native", grasp, options.demonstrations), "train").env
+            env = make_setup(config("native", grasp, options.demonstrations), "train").env
             state, controls = moments(env, options.worlds)
             solved = {name: _ends(_stepper(env, settings), state, controls) for name, settings in _ENDS.items()}
             advance(1)
@@ -147,12 +147,12 @@ def _off(
     ends: Float[np.ndarray, "n q"], solved: Mapping[str, Float[np.ndarray, "n q"]]
 ) -> tuple[dict[str, list[float]], dict[str, list[float]]]:
     """See `Figures`. The object's pose is the end of qpos, its position first; hinges come just before."""
-    thing, hinges = {}, {}
+    object_errors, hinges = {}, {}
     for name, end in solved.items():
         away = ends - end
-        thing[name] = np.percentile(np.linalg.norm(away[:, -7:-4], axis=-1), _SHARES).tolist()
+        object_errors[name] = np.percentile(np.linalg.norm(away[:, -7:-4], axis=-1), _SHARES).tolist()
         hinges[name] = np.percentile(np.abs(away[:, -7 - NUM_HINGES : -7]).max(axis=-1), _SHARES).tolist()
-    return thing, hinges
+    return object_errors, hinges
 
 
 def _text(figures: Mapping[str, Mapping[str, Figures]]) -> list[str]:

@@ -26,7 +26,7 @@ from train.benchmark.engine_report import Results, Row, text, write
 from train.benchmark.learning import Learning, measure_learning
 from train.benchmark.memory import fitting, with_memory
 from train.benchmark.timing import rates
-from train.experiment.setup import World, make_world
+from train.experiment.setup import TrackingSetup, make_setup
 from train.reports.machine import accelerator
 from train.settings.config import Config
 
@@ -93,19 +93,19 @@ def report(options: Options) -> list[str]:
     with contextlib.redirect_stdout(sys.stderr):  # progress; the report alone goes to standard output
         for grasp in grasps:
             here = [name for name in engines if name == "native" or grasp in compiled]
-            made = {
-                name: make_world(config(name, grasp, options.demonstrations), "train")
+            setups = {
+                name: make_setup(config(name, grasp, options.demonstrations), "train")
                 for name in dict.fromkeys((*here, "native"))
             }
-            entered = list(_enter(made, here, options, notes))
+            entered = list(_enter(setups, here, options, notes))
             with counter(options.runs * len(entered), f"timing {grasp}") as advance:
                 measured = rates(entered, options.runs, options.seconds, advance)
             rows += [
-                Row.of(grasp, c, rate, made["native"].env.dt, task.substeps)
+                Row.of(grasp, c, rate, setups["native"].env.dt, task.substeps)
                 for c, rate in zip(entered, measured, strict=True)
             ]
             if options.ppo and default_engine() in here:
-                learning.append(_learning(options, grasp, made, entered))
+                learning.append(_learning(options, grasp, setups, entered))
     results = Results(rows=rows, learning=learning, notes=notes, substeps=task.substeps, dt=task.substeps * TIMESTEP)
     kept = ("grasps", "engines", "compiled", "worlds", "full", "runs", "seconds")
     lines = text(results)
@@ -152,12 +152,12 @@ def config(engine: str, grasp: str, demonstrations: Path) -> Config:
 
 
 def _enter(
-    made: Mapping[str, World], engines: Sequence[str], options: Options, notes: list[str]
+    setups: Mapping[str, TrackingSetup], engines: Sequence[str], options: Options, notes: list[str]
 ) -> Iterator[Contestant]:
     """All contestants, compiled and run once. The environment is entered on the engine that training picks here."""
     worlds = sorted(set(options.worlds))
     for name in engines:
-        env = made[name].env
+        env = setups[name].env
         parts = [physics, environment] if name == default_engine() else [physics]
         for enter, scope in zip(parts, ("physics", "environment"), strict=False):
             for count in _counts(worlds, options.full and name != "native"):
@@ -167,7 +167,7 @@ def _enter(
                     notes.append(f"{name}, {scope}: {count:,} worlds do not fit into memory")
                     break
                 yield contestant
-    native = made["native"].env
+    native = setups["native"].env
     yield with_memory(functools.partial(step_loop, native))
     for count in worlds:
         yield with_memory(functools.partial(open_rollout, native, count, cores()))
@@ -182,7 +182,9 @@ def _counts(worlds: Sequence[int], full: bool) -> Iterator[int]:
         yield count
 
 
-def _learning(options: Options, grasp: str, made: Mapping[str, World], entered: Sequence[Contestant]) -> Learning:
+def _learning(
+    options: Options, grasp: str, setups: Mapping[str, TrackingSetup], entered: Sequence[Contestant]
+) -> Learning:
     name = default_engine()
     most = max(options.worlds)
     alone, around = (
@@ -190,5 +192,5 @@ def _learning(options: Options, grasp: str, made: Mapping[str, World], entered: 
         for scope in ("physics", "environment")
     )
     print(f"training {grasp} on {name}, {most} worlds", flush=True)
-    made_of = config(name, grasp, options.demonstrations)
-    return measure_learning(made_of, made[name], alone, around, options.runs, options.seconds)
+    composed = config(name, grasp, options.demonstrations)
+    return measure_learning(composed, setups[name], alone, around, options.runs, options.seconds)

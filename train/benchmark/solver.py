@@ -195,7 +195,7 @@ class _Take:
 
 def _depths(model: mujoco.MjModel, states: Float[np.ndarray, "t q"]) -> Float[np.ndarray, "_"]:
     """How deep (m) hand and object are in each other at each contact of these states."""
-    data, thing = mujoco.MjData(model), model.body(OBJECT).id
+    data, object_id = mujoco.MjData(model), model.body(OBJECT).id
     found: list[float] = []
     for state in states:
         data.qpos[:] = state
@@ -203,7 +203,7 @@ def _depths(model: mujoco.MjModel, states: Float[np.ndarray, "t q"]) -> Float[np
         mujoco.mj_comPos(model, data)
         mujoco.mj_collision(model, data)
         bodies = model.geom_bodyid[data.contact.geom]
-        ours = (bodies == thing).any(axis=1) & (bodies > 0).all(axis=1)  # the ground is part of the world, body 0
+        ours = (bodies == object_id).any(axis=1) & (bodies > 0).all(axis=1)  # the ground is part of the world, body 0
         found += list(-data.contact.dist[ours])
     return np.array(found)
 

@@ -5,23 +5,23 @@ from pathlib import Path
 from envs.demonstrations.twin_hands import twins
 from envs.tracking import TrackingEnv
 from mjx_hand.motion.demonstration import load_demonstration
-from train.experiment.setup import World
+from train.experiment.setup import TrackingSetup
 from train.settings.config import Config
 
 FOLDER = Path(__file__).parent.parent / "policies"
 
 
-def included_policy(name: str) -> Path | None:
+def bundled_policy(name: str) -> Path | None:
     """The policy of this experiment that comes with the project, if one does."""
     path = FOLDER / f"{name}.npz"
     return path if path.is_file() else None
 
 
-def included_world(config: Config) -> World:
+def bundled_setup(config: Config) -> TrackingSetup:
     """The environment over the one demonstration that comes with the experiment's policy."""
     demonstrations = [load_demonstration(demonstration_path(config.name))]
     hands = twins(demonstrations)
-    return World(demonstrations, hands, TrackingEnv(demonstrations, hands, config.engine, config.task))
+    return TrackingSetup(demonstrations, hands, TrackingEnv(demonstrations, hands, config.engine, config.task))
 
 
 def demonstration_path(name: str) -> Path:

@@ -16,7 +16,7 @@ from envs.evaluation.roll_out import make_roll_out, zero_residual
 from envs.evaluation.rollout import Rollouts
 from mjx_hand.errors import InputError
 from mjx_hand.progress import counter
-from train.experiment.setup import World, chosen_checkpoint, make_world, without_grip
+from train.experiment.setup import TrackingSetup, chosen_checkpoint, make_setup, without_grip
 from train.learning.checkpoint import Checkpoint
 from train.learning.policy import deterministic_policy
 from train.settings.config import Config
@@ -29,7 +29,7 @@ POLICY, ZERO, REPLAY = "policy", "zero residual", "demonstration alone"
 class Results:
     """Rollouts and their scores, by column title, of one seed's policy and the baselines."""
 
-    world: World
+    setup: TrackingSetup
     checkpoint: Checkpoint
     rollouts: Mapping[str, Rollouts]
     evaluations: Mapping[str, Evaluation]
@@ -39,7 +39,7 @@ def evaluate_seeds(configs: Sequence[Config], part: str = "heldout") -> dict[int
     """Roll out each seed's policy and the baselines on one part of the demonstrations and score them, by seed.
 
     Args:
-        configs: an experiment with one seed after the other, as `train.settings.config.of_seeds` makes them.
+        configs: an experiment with one seed after the other, as `train.settings.config.expand_seeds` makes them.
         part: "heldout" or "train".
 
     Raises:
@@ -47,27 +47,27 @@ def evaluate_seeds(configs: Sequence[Config], part: str = "heldout") -> dict[int
     """
     for config in configs:
         _check_trained(config)
-    world = make_world(configs[0], part)
-    env = world.env
+    setup = make_setup(configs[0], part)
+    env = setup.env
     checkpoints = {config.seed: chosen_checkpoint(config, env.observation_size) for config in configs}
-    objects = [demonstration.object for demonstration in world.demonstrations]
-    alone = without_grip(world)
+    objects = [demonstration.object for demonstration in setup.demonstrations]
+    alone = without_grip(setup)
     policy = deterministic_policy(configs[0].ppo, env.observation_size, env.action_size)
     rollouts: dict[int | str, Rollouts] = {}
     with counter(len(configs) + 2, "evaluating (sets of rollouts)") as advance:
-        roll_out = make_roll_out(env, world.hands, policy, HOLD)
+        roll_out = make_roll_out(env, setup.hands, policy, HOLD)
         for seed, checkpoint in checkpoints.items():
             rollouts[seed] = roll_out(checkpoint.policy)
             advance(1)
-        rollouts[ZERO] = make_roll_out(env, world.hands, zero_residual, HOLD)(None)
+        rollouts[ZERO] = make_roll_out(env, setup.hands, zero_residual, HOLD)(None)
         advance(1)
-        rollouts[REPLAY] = make_roll_out(alone.env, world.hands, zero_residual, HOLD)(None)
+        rollouts[REPLAY] = make_roll_out(alone.env, setup.hands, zero_residual, HOLD)(None)
         advance(1)
     scores = {key: evaluate(each, objects) for key, each in rollouts.items()}
     keys = {seed: {POLICY: seed, ZERO: ZERO, REPLAY: REPLAY} for seed in checkpoints}
     return {
         seed: Results(
-            world,
+            setup,
             checkpoint,
             {title: rollouts[key] for title, key in keys[seed].items()},
             {title: scores[key] for title, key in keys[seed].items()},

@@ -20,7 +20,7 @@ from train.settings.config import Config
 
 
 @dataclasses.dataclass(frozen=True)
-class World:
+class TrackingSetup:
     """Demonstrations, the twin's hand for each, and the environment over them."""
 
     demonstrations: Sequence[Demonstration]
@@ -28,25 +28,25 @@ class World:
     env: TrackingEnv
 
 
-def make_world(config: Config, part: str) -> World:
+def make_setup(config: Config, part: str) -> TrackingSetup:
     """The environment over one part ("train", "heldout") of the experiment's demonstrations, made where missing.
 
     Of all grasp types together, they stand one type after the other.
     """
     demonstrations = []
-    for settings in config.data.of_each_type():
+    for settings in config.data.expand_types():
         with shares() as report:
             folder = make_set(settings, config.demonstrations, report)
         demonstrations += load_part(folder, part)
     hands = twins(demonstrations)
-    return World(demonstrations, hands, TrackingEnv(demonstrations, hands, config.engine, config.task))
+    return TrackingSetup(demonstrations, hands, TrackingEnv(demonstrations, hands, config.engine, config.task))
 
 
-def without_grip(world: World) -> World:
+def without_grip(setup: TrackingSetup) -> TrackingSetup:
     """The same with demonstrations replayed as they are, without the forces that the reference adds."""
-    task = dataclasses.replace(world.env.task, grip_force=0.0)
-    env = TrackingEnv(world.demonstrations, world.hands, world.env.engine.name, task)
-    return dataclasses.replace(world, env=env)
+    task = dataclasses.replace(setup.env.task, grip_force=0.0)
+    env = TrackingEnv(setup.demonstrations, setup.hands, setup.env.engine.name, task)
+    return dataclasses.replace(setup, env=env)
 
 
 def chosen_checkpoint(config: Config, observation_size: int) -> Checkpoint:
@@ -65,13 +65,13 @@ def chosen_checkpoint(config: Config, observation_size: int) -> Checkpoint:
     return checkpoint
 
 
-def rolled_out(config: Config, world: World) -> tuple[Checkpoint, Rollouts, Evaluation]:
+def rolled_out(config: Config, setup: TrackingSetup) -> tuple[Checkpoint, Rollouts, Evaluation]:
     """The chosen policy, a rollout of each demonstration under it, and their scores.
 
     Raises:
         InputError: as `chosen_checkpoint`.
     """
-    checkpoint = chosen_checkpoint(config, world.env.observation_size)
-    policy = deterministic_policy(config.ppo, world.env.observation_size, world.env.action_size)
-    rollouts = make_roll_out(world.env, world.hands, policy)(checkpoint.policy)
-    return checkpoint, rollouts, evaluate(rollouts, [demonstration.object for demonstration in world.demonstrations])
+    checkpoint = chosen_checkpoint(config, setup.env.observation_size)
+    policy = deterministic_policy(config.ppo, setup.env.observation_size, setup.env.action_size)
+    rollouts = make_roll_out(setup.env, setup.hands, policy)(checkpoint.policy)
+    return checkpoint, rollouts, evaluate(rollouts, [demonstration.object for demonstration in setup.demonstrations])

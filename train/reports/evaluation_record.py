@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from envs.demonstrations.dataset import set_folder, told_apart_by
+from envs.demonstrations.dataset import fingerprint, set_folder
 from envs.evaluation.evaluate import Evaluation
 from envs.grasps import grasp_names, grasp_type
 from mjx_hand.files.npz_archive import replacing
@@ -33,15 +33,15 @@ def write_results(results: Mapping[int, Results], configs: Sequence[Config], fil
     out, config, first = shared_folder(configs), configs[0], next(iter(results.values()))
     policies = {seed: result.evaluations[POLICY] for seed, result in results.items()}
     baselines = {title: e for title, e in first.evaluations.items() if title != POLICY}
-    grasps = [demonstration.grasp for demonstration in first.world.demonstrations]
+    grasps = [demonstration.grasp for demonstration in first.setup.demonstrations]
     by_type = [type_scores(e, grasps) for e in policies.values()]
     summary = {
         "schema": SCHEMA,
         "experiment": config.name,
         "grasp": config.data.grasp,
-        "engine": first.world.env.engine.name,
+        "engine": first.setup.env.engine.name,
         "checkpoint_steps": {seed: result.checkpoint.steps for seed, result in results.items()},
-        "demonstrations": len(first.world.demonstrations),
+        "demonstrations": len(first.setup.demonstrations),
         "scores": {POLICY: _mean([e.rows() for e in policies.values()]), **{t: e.rows() for t, e in baselines.items()}},
         "types": {
             POLICY: {grasp: _mean([scores[grasp] for scores in by_type]) for grasp in by_type[0]},
@@ -54,7 +54,7 @@ def write_results(results: Mapping[int, Results], configs: Sequence[Config], fil
         },
         "failed": [failed for seed, e in policies.items() for failed in _failed(seed, e)],
         "films": films,
-        "made_of": made_of(configs),
+        "made_of": evaluation_fingerprint(configs),
     }
     with replacing(out / "evaluation.json") as temporary:
         temporary.write_text(json.dumps(summary, indent=1) + "\n")
@@ -69,7 +69,7 @@ def write_results(results: Mapping[int, Results], configs: Sequence[Config], fil
     return out
 
 
-def kept_results(configs: Sequence[Config]) -> dict[str, Any] | None:
+def cached_results(configs: Sequence[Config]) -> dict[str, Any] | None:
     """The summary of an evaluation of the very same policies with the same settings, None where there is none."""
     path = shared_folder(configs) / "evaluation.json"
     if not path.is_file():
@@ -78,17 +78,17 @@ def kept_results(configs: Sequence[Config]) -> dict[str, Any] | None:
         summary = json.loads(path.read_text())
     except ValueError:  # a file of someone else's: it is written anew
         return None
-    same = isinstance(summary, dict) and summary.get("made_of") == made_of(configs)
+    same = isinstance(summary, dict) and summary.get("made_of") == evaluation_fingerprint(configs)
     return summary if same and summary["films"] else None
 
 
-def made_of(configs: Sequence[Config]) -> str:
+def evaluation_fingerprint(configs: Sequence[Config]) -> str:
     """A digest of all that an evaluation depends on: settings, demonstrations, policies and the version."""
     content = hashlib.sha256(version("mjx-hand").encode())
     for config in configs:
-        parts = [told_apart_by(config.data)]
+        parts = [fingerprint(config.data)]
         parts += [dataclasses.asdict(part) for part in (config.task, config.ppo, config.checks)]
-        sets = [set_folder(settings, config.demonstrations).name for settings in config.data.of_each_type()]
+        sets = [set_folder(settings, config.demonstrations).name for settings in config.data.expand_types()]
         forces = [grasp_type(name).grip_force for name in grasp_names()]
         told = [config.name, config.engine, config.seed, sets, forces, parts]
         content.update(json.dumps(told, sort_keys=True).encode())

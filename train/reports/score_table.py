@@ -72,9 +72,7 @@ def demonstration_table(
         objects: each demonstration's object.
     """
     columns = {f"seed {seed}": e for seed, e in policies.items()} | dict(baselines)
-    rows = [
-        (f"{k}: {object_text(thing)}", *(_outcome(e, k) for e in columns.values())) for k, thing in enumerate(objects)
-    ]
+    rows = [(f"{k}: {object_text(obj)}", *(_outcome(e, k) for e in columns.values())) for k, obj in enumerate(objects)]
     return Table(("demonstration", *columns), rows, "Tracking error (cm), and why it failed where it did.")
 
 
@@ -98,16 +96,16 @@ def failed_table(policies: Mapping[int, Evaluation]) -> Table:
     return Table(("", "policy", "reason", "tracking error", "rotation error"), rows, _REASONS)
 
 
-def object_text(thing: ObjectDescription) -> str:
+def object_text(obj: ObjectDescription) -> str:
     """An object in words: kind, size in mm, mass in g and friction."""
-    mm = [f"{1000 * value:.0f}" for value in 2 * np.asarray(thing.size)]
+    mm = [f"{1000 * value:.0f}" for value in 2 * np.asarray(obj.size)]
     sizes = {
         "sphere": f"⌀ {mm[0]}",
         "cylinder": f"⌀ {mm[0]} × {mm[1]}",
-        "capsule": f"⌀ {mm[0]} × {1000 * 2 * (thing.size[0] + thing.size[1]):.0f}",
+        "capsule": f"⌀ {mm[0]} × {1000 * 2 * (obj.size[0] + obj.size[1]):.0f}",
     }
-    size = sizes.get(thing.kind, " × ".join(mm))
-    return f"{thing.kind} {size} mm, {1000 * float(thing.mass):.0f} g, friction {float(thing.friction):.2f}"
+    size = sizes.get(obj.kind, " × ".join(mm))
+    return f"{obj.kind} {size} mm, {1000 * float(obj.mass):.0f} g, friction {float(obj.friction):.2f}"
 
 
 def score_text(name: str, value: float) -> str:

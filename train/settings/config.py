@@ -14,7 +14,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from envs.demonstrations.dataset import SetSettings
 from envs.physics import ENGINES
-from envs.settings import made_of
+from envs.settings import from_dict
 from envs.task import Task
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
@@ -79,12 +79,12 @@ def compose(overrides: Sequence[str] = ()) -> Config:
 
 
 def compose_seeds(overrides: Sequence[str] = ()) -> list[Config]:
-    """The configuration of each of `seeds`, as `of_seeds`.
+    """The configuration of each of `seeds`, as `expand_seeds`.
 
     Raises:
-        InputError: as `compose` and `of_seeds`.
+        InputError: as `compose` and `expand_seeds`.
     """
-    return of_seeds(_composed(overrides))
+    return expand_seeds(_composed(overrides))
 
 
 def _composed(overrides: Sequence[str]) -> DictConfig:
@@ -100,7 +100,7 @@ def _composed(overrides: Sequence[str]) -> DictConfig:
         raise InputError(one_line(error)) from None
 
 
-def of_seeds(composed: DictConfig) -> list[Config]:
+def expand_seeds(composed: DictConfig) -> list[Config]:
     """A configuration for each of `seeds`, or for `seed` alone where they are empty; `out` follows the seed.
 
     Raises:
@@ -131,7 +131,7 @@ def to_config(composed: DictConfig) -> Config:
     """
     if composed.seeds:
         raise InputError(f"seeds is {list(composed.seeds)}, but this takes one seed; give it alone, such as seed=0")
-    return made_of(Config, OmegaConf.to_container(composed, resolve=True, throw_on_missing=True))
+    return from_dict(Config, OmegaConf.to_container(composed, resolve=True, throw_on_missing=True))
 
 
 def command(task: Callable[[Config], object]) -> None:
@@ -144,7 +144,7 @@ def command(task: Callable[[Config], object]) -> None:
 
 def command_of_seeds(task: Callable[[Sequence[Config]], object]) -> None:
     """Like `command`, for a task that takes the configurations of several seeds (`seeds=[0,1,2]`)."""
-    _command(lambda composed: task([_on_device(config) for config in of_seeds(composed)]))
+    _command(lambda composed: task([_on_device(config) for config in expand_seeds(composed)]))
 
 
 def _on_device(config: Config) -> Config:
@@ -164,7 +164,7 @@ def _command(task: Callable[[DictConfig], object]) -> None:
     arguments = sys.argv[1:]
     if not any(argument.startswith("-") for argument in arguments):
         try:
-            of_seeds(_composed(arguments))
+            expand_seeds(_composed(arguments))
         except InputError as error:
             refuse(error)
     try:

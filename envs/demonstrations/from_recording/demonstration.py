@@ -12,11 +12,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from envs.demonstrations.from_recording.grasp_pose import solve_holdings
-from envs.demonstrations.from_recording.grasp_search import firmest
-from envs.demonstrations.from_recording.grasp_trajectory import Act, take
-from envs.demonstrations.from_recording.observed import beginning, in_world, mended, resampled
-from envs.demonstrations.from_recording.support_plane import find_table, world_from_recording
+from envs.demonstrations.from_recording.grasp_pose import solve_grasp_poses
+from envs.demonstrations.from_recording.grasp_search import search_grasp
+from envs.demonstrations.from_recording.grasp_trajectory import Act, grasp_trajectory
+from envs.demonstrations.from_recording.observed import in_world, reconstruct, resampled, start_time
+from envs.demonstrations.from_recording.support_plane import estimate_support_plane, world_from_recording
 from envs.demonstrations.from_recording.variations import RecordingSettings
 from mjx_hand.capture.datasets.dexmv_object import RecordedObject, load_object, recording_files
 from mjx_hand.capture.keypoints.bone_lengths import lengths, shape_of_lengths
@@ -51,39 +51,39 @@ def read_demonstration(
     """
     report("reading the recording", 0.0)
     recording, mesh = recording_files(settings.path)
-    motion, thing = load_motion(recording), load_object(recording, mesh)
-    frames = min(motion.num_frames, len(thing.position))
+    motion, recorded = load_motion(recording), load_object(recording, mesh)
+    frames = min(motion.num_frames, len(recorded.position))
     if not motion.valid[:frames].all():
         raise InputError(f"{recording}: {int((~motion.valid[:frames]).sum())} frames have no hand; leave those out")
-    thing = dataclasses.replace(thing, rotation=thing.rotation[:frames], position=thing.position[:frames])
-    table = find_table(thing)
+    recorded = dataclasses.replace(recorded, rotation=recorded.rotation[:frames], position=recorded.position[:frames])
+    table = estimate_support_plane(recorded)
     model = load_hand(side=motion.side)
     shape, angles = _angles(motion, model)
     hand = build_rigid_hand(model, shape)
-    description = _description(thing, settings)
+    description = _description(recorded, settings)
     corners = description.hulls.reshape(-1, 3)
-    held, seen = mended(
-        in_world(motion, angles, thing, world_from_recording(table), table, -corners[:, 2].min()), table.lifted
+    held, observed = reconstruct(
+        in_world(motion, angles, recorded, world_from_recording(table), table, -corners[:, 2].min()), table.lifted
     )
-    seen = resampled(seen, beginning(seen, hand, table.lifted), settings.rate, settings.cutoff)
-    lowest = np.einsum("tj,cj->tc", seen.rotation[:, 2], corners).min(axis=1) + seen.position[:, 2]
-    seen.position[:, 2] += np.maximum(-lowest, 0.0)  # the filter rounds off how the object leaves the table
+    observed = resampled(observed, start_time(observed, hand, table.lifted), settings.rate, settings.cutoff)
+    lowest = np.einsum("tj,cj->tc", observed.rotation[:, 2], corners).min(axis=1) + observed.position[:, 2]
+    observed.position[:, 2] += np.maximum(-lowest, 0.0)  # the filter rounds off how the object leaves the table
 
-    act = Act(seen=seen, lifted=table.lifted / motion.fps, held=held, hand=hand, thing=description)
-    candidates = solve_holdings(held, hand, act.planes)
-    way = take(act, firmest(act, candidates, settings.force, report)[None])
+    act = Act(observed=observed, lifted=table.lifted / motion.fps, held=held, hand=hand, object=description)
+    candidates = solve_grasp_poses(held, hand, act.planes)
+    trajectory = grasp_trajectory(act, search_grasp(act, candidates, settings.force, report)[None])
     source = f"{motion.source} with {mesh.name}"
     return Demonstration(
         motion=JointMotion(
             fps=settings.rate,
-            angles=way.angles[0],
-            wrist_position=way.wrist_position[0],
-            wrist_quaternion=matrix_quaternions(way.wrist_rotation[0]),
-            valid=np.ones(len(seen.times), bool),
+            angles=trajectory.angles[0],
+            wrist_position=trajectory.wrist_position[0],
+            wrist_quaternion=matrix_quaternions(trajectory.wrist_rotation[0]),
+            valid=np.ones(len(observed.times), bool),
             side=motion.side,
             source=source,
         ),
-        object_pose=np.concatenate([way.position, matrix_quaternions(way.rotation[0])], axis=1),
+        object_pose=np.concatenate([trajectory.position, matrix_quaternions(trajectory.rotation[0])], axis=1),
         object=description,
         support=np.zeros((0, 3)),
         support_position=np.zeros((0, 3)),
@@ -103,8 +103,8 @@ def _angles(motion: Motion, model: HandModel) -> tuple[Float[np.ndarray, "s"], F
     return shape, np.asarray(refine_angles(angles, recorded_places(motion.rotations, subject), hand), float)
 
 
-def _description(thing: RecordedObject, settings: RecordingSettings) -> ObjectDescription:
-    hulls = convex_pieces(thing.vertices, thing.faces, concavity=0.03, most=settings.pieces)
+def _description(recorded: RecordedObject, settings: RecordingSettings) -> ObjectDescription:
+    hulls = convex_pieces(recorded.vertices, recorded.faces, concavity=0.03, most=settings.pieces)
     low = hulls[..., 2] < hulls[..., 2].min() + _FOOT
     hulls[low, 2] = hulls[..., 2].min()  # what stands has a flat foot, and few corners make it none
     size = np.abs(hulls).max(axis=(0, 1))

@@ -35,7 +35,7 @@ _PALM = np.array([0.0, 1.0, 0.0])  # towards the back of the hand
 
 
 @dataclasses.dataclass(frozen=True)
-class Holding:
+class GraspPose:
     """A hand and the object in it, or several.
 
     Attributes:
@@ -47,24 +47,24 @@ class Holding:
     rotation: Float[np.ndarray, "*n 3 3"]
     position: Float[np.ndarray, "*n 3"]
 
-    def __getitem__(self, index: int | np.ndarray | None) -> "Holding":
+    def __getitem__(self, index: int | np.ndarray | None) -> "GraspPose":
         """One or some of several; `None`: this one as a row of one."""
-        return Holding(self.angles[index], self.rotation[index], self.position[index])
+        return GraspPose(self.angles[index], self.rotation[index], self.position[index])
 
 
-def joined(holdings: Sequence[Holding]) -> Holding:
+def joined(grasps: Sequence[GraspPose]) -> GraspPose:
     """Several of several, one after the other."""
-    return Holding(*map(np.concatenate, zip(*map(_rows, holdings), strict=True)))
+    return GraspPose(*map(np.concatenate, zip(*map(_rows, grasps), strict=True)))
 
 
-def chosen(first: Bool[np.ndarray, "n"], one: Holding, other: Holding) -> Holding:
+def chosen(first: Bool[np.ndarray, "n"], one: GraspPose, other: GraspPose) -> GraspPose:
     """Those of `one` where `first`, else those of `other`."""
     pairs = zip(_rows(one), _rows(other), strict=True)
-    return Holding(*(np.where(first.reshape(-1, *[1] * (a.ndim - 1)), a, b) for a, b in pairs))
+    return GraspPose(*(np.where(first.reshape(-1, *[1] * (a.ndim - 1)), a, b) for a, b in pairs))
 
 
-def solve_holdings(recorded: Holding, hand: RigidHand, planes: Float[np.ndarray, "h f 4"]) -> Holding:
-    """n holdings near a recorded one in which the last phalanges touch and no link is inside the object, nearest first.
+def solve_grasp_poses(recorded: GraspPose, hand: RigidHand, planes: Float[np.ndarray, "h f 4"]) -> GraspPose:
+    """n grasps near a recorded one in which the last phalanges touch and no link is inside the object, nearest first.
 
     An object that looks much the same from all sides can lie in the hand in several ways: one for each way to turn it
     about its axis to begin with.
@@ -87,27 +87,27 @@ def solve_holdings(recorded: Holding, hand: RigidHand, planes: Float[np.ndarray,
                 max_nfev=_STEPS,
             )
         )
-    return joined([_holding(one.x, recorded, hand)[None] for one in sorted(found, key=lambda one: one.cost)])
+    return joined([_grasp_pose(one.x, recorded, hand)[None] for one in sorted(found, key=lambda one: one.cost)])
 
 
 def unlikeliness(
-    holdings: Holding, recorded: Holding, hand: RigidHand, planes: Float[np.ndarray, "h f 4"]
+    grasps: GraspPose, recorded: GraspPose, hand: RigidHand, planes: Float[np.ndarray, "h f 4"]
 ) -> Float[np.ndarray, "n"]:
-    """How far n holdings are from touching, from staying outside and from the recorded one.
+    """How far n grasps are from touching, from staying outside and from the recorded one.
 
-    It is what `solve_holdings` makes least: about 5 there, and 1 for 1 mm of gap at one finger tip, or 0.25 rad of one
-    hinge, alone.
+    It is what `solve_grasp_poses` makes least: about 5 there, and 1 for 1 mm of gap at one finger tip, or 0.25 rad of
+    one hinge, alone.
     """
-    turn = Rotation.from_matrix(recorded.rotation.T @ holdings.rotation).as_rotvec()
-    rows = np.concatenate([holdings.angles, holdings.position - recorded.position, turn], axis=1)
+    turn = Rotation.from_matrix(recorded.rotation.T @ grasps.rotation).as_rotvec()
+    rows = np.concatenate([grasps.angles, grasps.position - recorded.position, turn], axis=1)
     bare = on_device(hand)
     return np.asarray(_norms(jnp.asarray(rows, jnp.float32), bare, _rows(recorded), jnp.asarray(planes)), float)
 
 
-def _holding(x: Float[np.ndarray, "26"], recorded: Holding, hand: RigidHand) -> Holding:
+def _grasp_pose(x: Float[np.ndarray, "26"], recorded: GraspPose, hand: RigidHand) -> GraspPose:
     angles, rotation, position = (np.asarray(a, float) for a in _placed(jnp.asarray(x), _rows(recorded)))
     angles = np.clip(angles, hand.hinge_lower, hand.hinge_upper)
-    return Holding(angles=angles, rotation=Rotation.from_matrix(rotation).as_matrix(), position=position)
+    return GraspPose(angles=angles, rotation=Rotation.from_matrix(rotation).as_matrix(), position=position)
 
 
 def capsule_gaps(
@@ -140,8 +140,8 @@ def _axes(
     return (capsule_points(angles, hand, _ALONG) - position) @ jnp.asarray(rotation)
 
 
-def _rows(holding: Holding) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return holding.angles, holding.rotation, holding.position
+def _rows(grasp: GraspPose) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return grasp.angles, grasp.rotation, grasp.position
 
 
 def _placed(x: Array, recorded: tuple) -> tuple[Array, Array, Array]:

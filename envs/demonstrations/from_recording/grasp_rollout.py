@@ -1,4 +1,4 @@
-"""Trying holdings in the engine: each takes the object from where it stands, lifts it and carries it as recorded."""
+"""Trying grasps in the engine: each takes the object from where it stands, lifts it and carries it as recorded."""
 
 import dataclasses
 
@@ -9,8 +9,8 @@ from jaxtyping import Array, Float
 from mujoco import batch
 from scipy.spatial.transform import Rotation
 
-from envs.demonstrations.from_recording.grasp_pose import Holding, chosen
-from envs.demonstrations.from_recording.grasp_trajectory import Act, take
+from envs.demonstrations.from_recording.grasp_pose import GraspPose, chosen
+from envs.demonstrations.from_recording.grasp_trajectory import Act, grasp_trajectory
 from envs.grip import grip_offsets
 from envs.physics.solver import gauss_seidel
 from envs.reference import anticipated
@@ -24,40 +24,40 @@ from mjx_hand.rigid.rigid_hand import on_device
 _SETTLED = 10  # frames after the fingers have closed
 _LOST, _TURNED = 0.03, 0.5  # m and rad from its way: lost
 _NO_BOXES = np.zeros((0, 3))
-_THING = NUM_WRIST + NUM_HINGES
+_OBJECT = NUM_WRIST + NUM_HINGES
 
 
 @dataclasses.dataclass(frozen=True)
-class Carried:
-    """What came of n holdings.
+class RolloutScore:
+    """What came of n grasps.
 
     Attributes:
-        kept: for what share of the time, from when the fingers begin to close, the object was on its way.
+        held_share: for what share of the time, from when the fingers begin to close, the object was on its way.
         error: how far the object was from its way until then, mean (m).
         settled: how hand and object lay before the lift.
     """
 
-    kept: Float[np.ndarray, "n"]
+    held_share: Float[np.ndarray, "n"]
     error: Float[np.ndarray, "n"]
-    settled: Holding
+    settled: GraspPose
 
 
-class Carrying:
-    """Worlds in which `count` holdings at a time are tried side by side.
+class GraspRollout:
+    """Worlds in which `count` grasps at a time are tried side by side.
 
     Args:
         act: what was recorded.
         force: with which the hands press (N).
-        count: of holdings.
+        count: of grasps.
     """
 
     def __init__(self, act: Act, force: float, count: int):
         self.act, self.count, self.gains = act, count, Gains()
-        seen, thing = act.seen, act.thing
-        self.base = seen.hand_rotation[0]
-        self.fps = 1 / (seen.times[1] - seen.times[0])
+        observed, description = act.observed, act.object
+        self.base = observed.hand_rotation[0]
+        self.fps = 1 / (observed.times[1] - observed.times[0])
         self.substeps = round(1 / (self.fps * TIMESTEP))
-        model = scene_model(act.hand, thing, _NO_BOXES, _NO_BOXES, self.base, gains=self.gains)
+        model = scene_model(act.hand, description, _NO_BOXES, _NO_BOXES, self.base, gains=self.gains)
         (self.model,) = gauss_seidel([model])
         self.heavy = with_heavy_object(self.model)
         self.worlds = batch.Batch(self.model, nsim=count)
@@ -69,27 +69,27 @@ class Carrying:
             def one(row: tuple[Array, Array, Array]) -> Array:
                 angles, *place = row
                 where = place[0], place[1]
-                return grip_offsets(angles, where, bare, thing.kind, jnp.zeros(3), force, self.gains, planes)
+                return grip_offsets(angles, where, bare, description.kind, jnp.zeros(3), force, self.gains, planes)
 
             return jax.lax.map(one, (angles, rotation, position), batch_size=8)
 
         self._grips = grips
 
-    def carry(self, holdings: Holding, *, fixed: bool) -> Carried:
+    def carry(self, grasps: GraspPose, *, fixed: bool) -> RolloutScore:
         """Take the object, lift and carry it; `fixed`: it stays where it is while the fingers close."""
         act, worlds = self.act, self.worlds
-        targets, controls, pose = self._commands(holdings)
+        targets, controls, pose = self._commands(grasps)
         settled = act.closed + _SETTLED
         worlds.set_models([self.heavy if fixed else self.model] * self.count)
         worlds.state[:] = 0.0
         qpos, qvel, ctrl = (worlds.bind(name) for name in ("qpos", "qvel", "ctrl"))
         qpos[:] = np.concatenate([targets[:, 0], pose[:, 0]], axis=1)
         lay, error, lost = qpos.copy(), [], []
-        for frame in range(1, len(act.seen.times)):
+        for frame in range(1, len(act.observed.times)):
             ctrl[:] = controls[:, frame]
             worlds.step(nstep=self.substeps)
             if fixed and frame <= settled:
-                qpos[:, _THING:], qvel[:, _THING:] = pose[:, frame], 0.0
+                qpos[:, _OBJECT:], qvel[:, _OBJECT:] = pose[:, frame], 0.0
             if frame == settled:
                 lay = qpos.copy()
                 worlds.set_models([self.model] * self.count)
@@ -98,29 +98,29 @@ class Carrying:
             lost.append((off > _LOST) | (turn > _TURNED) | ~np.isfinite(off))
         count = np.where(np.any(lost, axis=0), np.argmax(lost, axis=0), len(lost))
         before = np.arange(len(lost))[:, None] < count
-        return Carried(
-            kept=np.maximum(count - act.closing, 0) / (len(lost) - act.closing),
+        return RolloutScore(
+            held_share=np.maximum(count - act.closing, 0) / (len(lost) - act.closing),
             error=np.where(before, error, 0.0).sum(axis=0) / np.maximum(count, 1),
-            settled=_lie(lay, self.base, holdings),
+            settled=_relative_pose(lay, self.base, grasps),
         )
 
-    def _commands(self, holdings: Holding) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _commands(self, grasps: GraspPose) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Targets, controls and the object's poses, (n, t, 26), (n, t, 26) and (n, t, 7)."""
-        act, way = self.act, take(self.act, holdings)
+        act, trajectory = self.act, grasp_trajectory(self.act, grasps)
         turns = [
             wrist_coordinates(position, matrix_quaternions(rotation), self.base)
-            for position, rotation in zip(way.wrist_position, way.wrist_rotation, strict=True)
+            for position, rotation in zip(trajectory.wrist_position, trajectory.wrist_rotation, strict=True)
         ]
-        targets = np.concatenate([np.stack(turns), way.angles], axis=2)
-        until = act.closed + 1  # the holding stays as it is from then on, and so does the grip
-        rows = (way.angles[:, :until], *(part[:, :until] for part in way.in_hand))
+        targets = np.concatenate([np.stack(turns), trajectory.angles], axis=2)
+        until = act.closed + 1  # the grasp stays as it is from then on, and so does the grip
+        rows = (trajectory.angles[:, :until], *(part[:, :until] for part in trajectory.in_hand))
         grip = np.asarray(self._grips(*(jnp.asarray(row, jnp.float32) for row in rows)), float)
         controls = np.array(anticipated(jnp.asarray(targets, jnp.float32), self.gains, self.fps), float)
         controls[:, :until, NUM_WRIST:] += grip
         controls[:, until:, NUM_WRIST:] += grip[:, -1:]
         low, high = self.model.actuator_ctrlrange.T
-        place = np.broadcast_to(way.position, (*targets.shape[:2], 3))
-        turned = Rotation.from_matrix(way.rotation.reshape(-1, 3, 3)).as_quat(scalar_first=True)
+        place = np.broadcast_to(trajectory.position, (*targets.shape[:2], 3))
+        turned = Rotation.from_matrix(trajectory.rotation.reshape(-1, 3, 3)).as_quat(scalar_first=True)
         pose = np.concatenate([place, turned.reshape(*targets.shape[:2], 4)], axis=2)
         return targets, np.clip(controls, low, high), pose
 
@@ -128,19 +128,19 @@ class Carrying:
 def _off(qpos: Float[np.ndarray, "n q"], pose: Float[np.ndarray, "n 7"]) -> tuple[np.ndarray, np.ndarray]:
     """How far objects are from where they should be (m, rad)."""
     there = Rotation.from_quat(pose[:, 3:], scalar_first=True)
-    turn = there.inv() * Rotation.from_quat(np.nan_to_num(qpos[:, _THING + 3 :], nan=1.0), scalar_first=True)
-    return np.linalg.norm(qpos[:, _THING : _THING + 3] - pose[:, :3], axis=1), turn.magnitude()
+    turn = there.inv() * Rotation.from_quat(np.nan_to_num(qpos[:, _OBJECT + 3 :], nan=1.0), scalar_first=True)
+    return np.linalg.norm(qpos[:, _OBJECT : _OBJECT + 3] - pose[:, :3], axis=1), turn.magnitude()
 
 
-def _lie(qpos: Float[np.ndarray, "n q"], base: Float[np.ndarray, "3 3"], told: Holding) -> Holding:
+def _relative_pose(qpos: Float[np.ndarray, "n q"], base: Float[np.ndarray, "3 3"], told: GraspPose) -> GraspPose:
     """How hands and objects lie; as they were told to where the engine diverged."""
     sound = np.asarray(np.isfinite(qpos).all(axis=1))
     qpos = np.where(sound[:, None], qpos, qpos[np.argmax(sound)])
     wrist = Rotation.from_matrix(base) * Rotation.from_euler("XYZ", qpos[:, 3:NUM_WRIST])
-    thing = Rotation.from_quat(qpos[:, _THING + 3 :], scalar_first=True)
-    lie = Holding(
-        angles=qpos[:, NUM_WRIST:_THING],
-        rotation=(wrist.inv() * thing).as_matrix(),
-        position=wrist.inv().apply(qpos[:, _THING : _THING + 3] - qpos[:, :3] @ base.T),
+    object_rotation = Rotation.from_quat(qpos[:, _OBJECT + 3 :], scalar_first=True)
+    relative = GraspPose(
+        angles=qpos[:, NUM_WRIST:_OBJECT],
+        rotation=(wrist.inv() * object_rotation).as_matrix(),
+        position=wrist.inv().apply(qpos[:, _OBJECT : _OBJECT + 3] - qpos[:, :3] @ base.T),
     )
-    return chosen(sound, lie, told)
+    return chosen(sound, relative, told)

@@ -1,8 +1,8 @@
-"""Which holding near the recorded one a hand could have carried an object in: what the engine drops was not it.
+"""Which grasp near the recorded one a hand could have carried an object in: what the engine drops was not it.
 
 Capture is off by centimetres where a hand and an object hide each other; contacts are made or missed by millimetres. So
-holdings around those that touch (`holding.solve_holdings`) are tried in the engine (`carrying.Carrying`). Those that
-keep the object longest are changed at random and tried again: an evolution strategy.
+grasps around those that touch (`solve_grasp_poses`) are tried in the engine (`GraspRollout`). Those that keep the
+object longest are changed at random and tried again: an evolution strategy.
 """
 
 from collections.abc import Callable
@@ -11,10 +11,10 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from envs.demonstrations.from_recording.grasp_pose import Holding, chosen, joined, unlikeliness
-from envs.demonstrations.from_recording.grasp_rollout import Carried, Carrying
+from envs.demonstrations.from_recording.grasp_pose import GraspPose, chosen, joined, unlikeliness
+from envs.demonstrations.from_recording.grasp_rollout import GraspRollout, RolloutScore
 from envs.demonstrations.from_recording.grasp_trajectory import Act
-from envs.demonstrations.from_recording.pregrasp import opened
+from envs.demonstrations.from_recording.pregrasp import pregrasp
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
 
@@ -26,60 +26,60 @@ _FROM_SETTLED = 0.3  # of the changed start from how the hand lay on the object,
 _OFF_WAY, _UNLIKELY = 10.0, 0.003  # what 1 m off the way and an unlikeliness of 1 cost; losing it at once costs 1
 
 
-def firmest(
+def search_grasp(
     act: Act,
-    candidates: Holding,
+    candidates: GraspPose,
     force: float,
     report: Callable[[str, float], None] = lambda what, share: None,
     tried: int = 240,
-) -> Holding:
-    """The holding near the recorded one that carries the object all the way, nearest to its way and to the recording.
+) -> GraspPose:
+    """The grasp near the recorded one that carries the object all the way, nearest to its way and to the recording.
 
     Args:
         act: what was recorded.
         candidates: n, where to begin.
         force: with which the hand presses (N).
         report: told what is going on and how far it is.
-        tried: holdings a generation.
+        tried: grasps per generation.
 
     Raises:
         InputError: none does.
     """
-    carrying, rng = Carrying(act, force, tried), np.random.default_rng(0)
+    rollout, rng = GraspRollout(act, force, tried), np.random.default_rng(0)
     rows = np.arange(tried) % len(candidates.angles)
     scale = np.where(np.arange(tried) < len(candidates.angles), 0.0, 1.0)
     now, best = _changed(candidates[rows], act, scale, rng), 0.0
     for generation in range(_MOST):
         report("looking for a grasp that holds", min(generation / (_FEWEST + 1), 0.99))
-        carried = carrying.carry(now, fixed=generation < _FIXED)
-        order = np.argsort(_cost(now, carried, act), kind="stable")[: round(_KEPT * tried)]
-        best = float(carried.kept[order[0]])
+        score = rollout.carry(now, fixed=generation < _FIXED)
+        order = np.argsort(_cost(now, score, act), kind="stable")[: round(_KEPT * tried)]
+        best = float(score.held_share[order[0]])
         if generation >= _FEWEST and best == 1.0:
             return now[int(order[0])]
         parents = rng.choice(order, tried - len(order))
         settled = rng.random(len(parents)) < _FROM_SETTLED
-        starts = chosen(settled, carried.settled[parents], now[parents])
+        starts = chosen(settled, score.settled[parents], now[parents])
         now = joined([now[order], _changed(starts, act, rng.choice(_SCALES, len(parents)), rng)])
     raise InputError(
-        f"no posture near the recorded one carries the object of {act.thing.mass:g} kg and friction "
-        f"{act.thing.friction:g} with {force:g} N to the end (the best, {100 * best:.0f} % of the way); give "
+        f"no posture near the recorded one carries the object of {act.object.mass:g} kg and friction "
+        f"{act.object.friction:g} with {force:g} N to the end (the best, {100 * best:.0f} % of the way); give "
         "more force (data.recording.force), a lighter object or more friction"
     )
 
 
-def _cost(holdings: Holding, carried: Carried, act: Act) -> Float[np.ndarray, "n"]:
-    unlikely = unlikeliness(holdings, act.held, act.hand, act.planes)
-    return 1 - carried.kept + _OFF_WAY * carried.error + _UNLIKELY * unlikely
+def _cost(grasps: GraspPose, score: RolloutScore, act: Act) -> Float[np.ndarray, "n"]:
+    unlikely = unlikeliness(grasps, act.held, act.hand, act.planes)
+    return 1 - score.held_share + _OFF_WAY * score.error + _UNLIKELY * unlikely
 
 
-def _changed(holdings: Holding, act: Act, scale: Float[np.ndarray, "n"], rng: np.random.Generator) -> Holding:
+def _changed(grasps: GraspPose, act: Act, scale: Float[np.ndarray, "n"], rng: np.random.Generator) -> GraspPose:
     """Each changed at random, as far as `scale` says, with no finger inside the object."""
     count, scale = len(scale), scale[:, None]
-    angles = holdings.angles + scale * _ANGLE * rng.normal(size=(count, NUM_HINGES))
+    angles = grasps.angles + scale * _ANGLE * rng.normal(size=(count, NUM_HINGES))
     turn = Rotation.from_rotvec(scale * _TURN * rng.normal(size=(count, 3)))
-    changed = Holding(
+    changed = GraspPose(
         angles=np.clip(angles, act.hand.hinge_lower, act.hand.hinge_upper),
-        rotation=(Rotation.from_matrix(holdings.rotation) * turn).as_matrix(),
-        position=holdings.position + scale * _PLACE * rng.normal(size=(count, 3)),
+        rotation=(Rotation.from_matrix(grasps.rotation) * turn).as_matrix(),
+        position=grasps.position + scale * _PLACE * rng.normal(size=(count, 3)),
     )
-    return opened(changed, act.hand, act.planes, 0.0)
+    return pregrasp(changed, act.hand, act.planes, 0.0)

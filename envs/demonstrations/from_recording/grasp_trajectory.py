@@ -1,6 +1,6 @@
-"""How a recorded hand takes an object into a holding: it arrives with fingers open, closes, and carries.
+"""How a recorded hand takes an object into a grasp: it arrives with fingers open, closes, and carries.
 
-The recorded reach is off by as much as capture is, so it goes over into the holding's place before the lift. The
+The recorded reach is off by as much as capture is, so it goes over into the grasp's place before the lift. The
 object's way, and with it the hand's from then on, are the recording's.
 """
 
@@ -11,15 +11,15 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from envs.demonstrations.from_recording.grasp_pose import Holding, spin_of
-from envs.demonstrations.from_recording.observed import Seen
-from envs.demonstrations.from_recording.pregrasp import opened
+from envs.demonstrations.from_recording.grasp_pose import GraspPose, spin_of
+from envs.demonstrations.from_recording.observed import ObservedSequence
+from envs.demonstrations.from_recording.pregrasp import pregrasp
 from envs.demonstrations.scripted.script import minimum_jerk
 from mjx_hand.objects.description import ObjectDescription
 from mjx_hand.objects.primitives import hull_planes
 from mjx_hand.rigid.rigid_hand import RigidHand
 
-# s before the lift: from when to when the wrist and the open fingers go over from the recorded reach to the holding
+# s before the lift: from when to when the wrist and the open fingers go over from the recorded reach to the grasp
 # (made late, a correction of centimetres would go through the object), and from when to when the fingers close.
 _ARRIVING, _CLOSING = (1.4, 0.75), (0.8, 0.4)
 _CLEAR = 0.012  # m from open fingers to the object
@@ -30,27 +30,27 @@ class Act:
     """What a recording shows, and of what.
 
     Attributes:
-        seen: hand and object.
+        observed: hand and object.
         lifted: when the object is (s).
         held: how it then lies in the hand, as captured.
         hand: the twin's.
-        thing: the object, a mesh.
+        object: a mesh.
     """
 
-    seen: Seen
+    observed: ObservedSequence
     lifted: float
-    held: Holding
+    held: GraspPose
     hand: RigidHand
-    thing: ObjectDescription
+    object: ObjectDescription
 
     @functools.cached_property
     def planes(self) -> Float[np.ndarray, "h f 4"]:
         """Of the object's convex pieces (`mjx_hand.objects.primitives.hull_planes`)."""
-        return hull_planes(self.thing.hulls)
+        return hull_planes(self.object.hulls)
 
     @property
     def closed(self) -> int:
-        """The first frame in which the fingers are closed; object and hand are as in the holding from then on."""
+        """The first frame in which the fingers are closed; object and hand are as in the grasp from then on."""
         return int(np.argmax(self._share(_CLOSING) >= 1.0))
 
     @property
@@ -61,11 +61,11 @@ class Act:
     def _share(self, between: tuple[float, float]) -> Float[np.ndarray, "t"]:
         """0 before, 1 after, minimum jerk between."""
         begin, end = between
-        return minimum_jerk((self.seen.times - self.lifted + begin) / (begin - end))
+        return minimum_jerk((self.observed.times - self.lifted + begin) / (begin - end))
 
 
 @dataclasses.dataclass(frozen=True)
-class Taking:
+class GraspTrajectory:
     """n ways in which a hand takes an object, t frames; metres, radians, world frame.
 
     Attributes:
@@ -87,24 +87,24 @@ class Taking:
         return wrist @ self.rotation, np.einsum("ntij,ntj->nti", wrist, self.position - self.wrist_position)
 
 
-def take(act: Act, holdings: Holding) -> Taking:
-    """How the recorded hand takes the object into each of n holdings."""
-    seen, hand = act.seen, act.hand
+def grasp_trajectory(act: Act, grasps: GraspPose) -> GraspTrajectory:
+    """How the recorded hand takes the object into each of n grasps."""
+    observed, hand = act.observed, act.hand
     arriving, closing = (act._share(span)[:, None] for span in (_ARRIVING, _CLOSING))
     # An object that looks the same from all sides was turned about its axis otherwise than it seemed, and not the hand.
-    spins = [spin_of(act.held.rotation.T @ rotation) for rotation in holdings.rotation]
+    spins = [spin_of(act.held.rotation.T @ rotation) for rotation in grasps.rotation]
     spun = Rotation.from_rotvec(np.array(spins)[:, None] * [0.0, 0.0, 1.0]).as_matrix()
-    rotation = seen.rotation @ spun[:, None]
-    wrist_rotation = rotation @ np.swapaxes(holdings.rotation, 1, 2)[:, None]
-    wrist_position = seen.position - np.einsum("ntij,nj->nti", wrist_rotation, holdings.position)
-    spread = opened(holdings, hand, act.planes, _CLEAR).angles[:, None]
-    angles = seen.angles + arriving * (spread - seen.angles) + closing * (holdings.angles[:, None] - spread)
-    return Taking(
+    rotation = observed.rotation @ spun[:, None]
+    wrist_rotation = rotation @ np.swapaxes(grasps.rotation, 1, 2)[:, None]
+    wrist_position = observed.position - np.einsum("ntij,nj->nti", wrist_rotation, grasps.position)
+    spread = pregrasp(grasps, hand, act.planes, _CLEAR).angles[:, None]
+    angles = observed.angles + arriving * (spread - observed.angles) + closing * (grasps.angles[:, None] - spread)
+    return GraspTrajectory(
         angles=np.clip(angles, hand.hinge_lower, hand.hinge_upper),
-        wrist_rotation=_turned(seen.hand_rotation, wrist_rotation, arriving),
-        wrist_position=seen.hand_position + arriving * (wrist_position - seen.hand_position),
+        wrist_rotation=_turned(observed.hand_rotation, wrist_rotation, arriving),
+        wrist_position=observed.hand_position + arriving * (wrist_position - observed.hand_position),
         rotation=rotation,
-        position=seen.position,
+        position=observed.position,
     )
 
 

@@ -7,23 +7,23 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from envs.demonstrations.from_recording.grasp_pose import Holding, capsule_gaps
+from envs.demonstrations.from_recording.grasp_pose import GraspPose, capsule_gaps
 from mjx_hand.rigid.rigid_hand import RigidHand, on_device
 
 _STEPS, _STEP, _DAMPING = 20, 0.5, 0.02  # of damped least squares (m/rad)
 
 
-def opened(holdings: Holding, hand: RigidHand, planes: Float[np.ndarray, "h f 4"], clearance: float) -> Holding:
-    """Each of n holdings with all fingers at least `clearance` (m) off the object, as far as their limits allow."""
-    rows = tuple(jnp.asarray(row, jnp.float32) for row in (holdings.angles, holdings.rotation, holdings.position))
+def pregrasp(grasps: GraspPose, hand: RigidHand, planes: Float[np.ndarray, "h f 4"], clearance: float) -> GraspPose:
+    """Each of n grasps with all fingers at least `clearance` (m) off the object, as far as their limits allow."""
+    rows = tuple(jnp.asarray(row, jnp.float32) for row in (grasps.angles, grasps.rotation, grasps.position))
     bare = on_device(hand)
     angles = _open_all(rows, bare, jnp.asarray(planes, jnp.float32), clearance)
-    return dataclasses.replace(holdings, angles=np.asarray(angles, float))
+    return dataclasses.replace(grasps, angles=np.asarray(angles, float))
 
 
 @jax.jit
 def _open_all(
-    holdings: tuple[Array, Array, Array], hand: RigidHand, planes: Array, clearance: Float[Array, ""]
+    grasps: tuple[Array, Array, Array], hand: RigidHand, planes: Array, clearance: Float[Array, ""]
 ) -> Float[Array, "n 20"]:
     fingers = jnp.array([link > 0 for link in hand.capsule_links])
 
@@ -41,4 +41,4 @@ def _open_all(
 
         return jax.lax.fori_loop(0, _STEPS, step, row[0])
 
-    return jax.lax.map(one, holdings, batch_size=8)
+    return jax.lax.map(one, grasps, batch_size=8)

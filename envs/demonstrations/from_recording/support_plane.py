@@ -20,7 +20,7 @@ _FEWEST = 10  # standing frames
 
 
 @dataclasses.dataclass(frozen=True)
-class Table:
+class SupportPlane:
     """The table that an object stands on at first.
 
     Attributes:
@@ -36,7 +36,7 @@ class Table:
     standing: int
 
 
-def find_table(thing: RecordedObject) -> Table:
+def estimate_support_plane(recorded: RecordedObject) -> SupportPlane:
     """Fit the table under an object whose own z axis points up while it stands.
 
     Least squares over two directions and a height: while it stands, the object's axis and lowest point; later, how far
@@ -45,9 +45,9 @@ def find_table(thing: RecordedObject) -> Table:
     Raises:
         InputError: the object does not stand still at first, or is never lifted.
     """
-    frames = len(thing.position)
-    home = np.median(thing.position[: max(frames // 4, 1)], axis=0)
-    near = np.flatnonzero(np.linalg.norm(thing.position - home, axis=1) < _AWAY)
+    frames = len(recorded.position)
+    home = np.median(recorded.position[: max(frames // 4, 1)], axis=0)
+    near = np.flatnonzero(np.linalg.norm(recorded.position - home, axis=1) < _AWAY)
     lifted = int(near[-1]) + 1 if near.size else 0
     standing = lifted - _BEFORE
     if standing < _FEWEST or lifted >= frames:
@@ -55,8 +55,8 @@ def find_table(thing: RecordedObject) -> Table:
             f"the object stands still in {max(standing, 0)} of {frames} frames; give a recording that shows it stand "
             f"for at least {_FEWEST} frames, and then lifted"
         )
-    corners = np.einsum("tij,vj->tvi", thing.rotation, _outline(thing.vertices)) + thing.position[:, None]
-    axis = thing.rotation[:standing, :, 2]
+    corners = np.einsum("tij,vj->tvi", recorded.rotation, _outline(recorded.vertices)) + recorded.position[:, None]
+    axis = recorded.rotation[:standing, :, 2]
 
     def off(x: Float[np.ndarray, "4"]) -> Float[np.ndarray, "r"]:
         up = x[:3] / np.linalg.norm(x[:3])
@@ -72,7 +72,9 @@ def find_table(thing: RecordedObject) -> Table:
     start = np.median(axis, axis=0)
     start /= np.linalg.norm(start)
     found = least_squares(off, [*start, np.median((corners[:standing] @ start).min(axis=1))]).x
-    return Table(up=found[:3] / np.linalg.norm(found[:3]), height=float(found[3]), lifted=lifted, standing=standing)
+    return SupportPlane(
+        up=found[:3] / np.linalg.norm(found[:3]), height=float(found[3]), lifted=lifted, standing=standing
+    )
 
 
 def _outline(vertices: Float[np.ndarray, "v 3"]) -> Float[np.ndarray, "c 3"]:
@@ -84,7 +86,7 @@ def _outline(vertices: Float[np.ndarray, "v 3"]) -> Float[np.ndarray, "c 3"]:
     return vertices[np.unique(np.argmax(vertices @ directions.T, axis=0))]
 
 
-def world_from_recording(table: Table) -> Float[np.ndarray, "3 3"]:
+def world_from_recording(table: SupportPlane) -> Float[np.ndarray, "3 3"]:
     """The rotation to a world with z up; its x lies as near as it can to the recording's."""
     x = np.eye(3)[0] - table.up * table.up[0]
     x /= np.linalg.norm(x)

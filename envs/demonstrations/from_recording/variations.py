@@ -88,10 +88,10 @@ def vary(demonstration: Demonstration, settings: RecordingSettings, rng: np.rand
         wrist_position=_turned_about(d, turned) + moved,
         wrist_quaternion=matrix_quaternions(wrist.as_matrix()),
     )
-    thing = replace(
+    varied = replace(
         d.object, mass=float(rng.uniform(*settings.masses)), friction=float(rng.uniform(*settings.frictions))
     )
-    return replace(d, motion=motion, object=thing)
+    return replace(d, motion=motion, object=varied)
 
 
 def _at_pace(d: Demonstration, speed: float) -> Demonstration:

@@ -88,7 +88,7 @@ class CaptureSettings:
         usual = {field.name: field.default for field in dataclasses.fields(self) if field.name in _PROJECTION}
         return dataclasses.replace(self, **usual)
 
-    def told_apart_by(self) -> dict[str, Any]:
+    def fingerprint(self) -> dict[str, Any]:
         """What tells recordings apart: all settings, the projection's only where they are not the usual ones.
 
         There was one projection first, and sets from then keep their names.

@@ -143,26 +143,26 @@ def _attempt(
 
 def draw_scripts(grasp: GraspType, hands: Sequence[RigidHand], rng: np.random.Generator) -> list[Script]:
     """A random grasp of each hand, less those for whose object no posture is found."""
-    things = [_draw_object(grasp, rng) for _ in hands]
-    solved = solve_postures(grasp, hands, np.stack([thing.size for thing in things]))
+    descriptions = [_draw_object(grasp, rng) for _ in hands]
+    solved = solve_postures(grasp, hands, np.stack([description.size for description in descriptions]))
     postures = [jax.tree.map(lambda leaf, k=k: np.asarray(leaf[k], float), solved) for k in range(len(hands))]
     gains = Gains()
     lying = np.array(grasp.object_rotation)
     upright = Rotation.from_matrix(lying).as_quat(scalar_first=True)
     scripts = []
-    for k, (hand, thing, posture) in enumerate(zip(hands, things, postures, strict=True)):
+    for k, (hand, description, posture) in enumerate(zip(hands, descriptions, postures, strict=True)):
         if posture.touch_error >= _TOUCH_LIMIT:
             continue
-        reach = np.abs(lying[2]) @ np.asarray(half_extents(thing.kind, jnp.asarray(thing.size)))
+        reach = np.abs(lying[2]) @ np.asarray(half_extents(description.kind, jnp.asarray(description.size)))
         centre = np.array([0.0, 0.0, grasp.rest + reach])
         scripts.append(
             Script(
                 hand=k,
-                object=thing,
+                object=description,
                 object_start=np.concatenate([centre, upright]),
                 motion=_draw_motion(grasp, posture, centre, hand, gains, rng),
                 base=posture.rotation,
-                model=scene_model(hand, thing, *support_boxes(grasp), posture.rotation, gains=gains),
+                model=scene_model(hand, description, *support_boxes(grasp), posture.rotation, gains=gains),
             )
         )
     return scripts

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from envs.demonstrations import dataset
-from envs.demonstrations.dataset import PARTS, SetSettings, load_part, make_set, set_folder, told_apart_by
+from envs.demonstrations.dataset import PARTS, SetSettings, fingerprint, load_part, make_set, set_folder
 from envs.demonstrations.scripted.simulated_capture import CaptureSettings
 from envs.demonstrations.twin_hands import twins
 from envs.tracking import TrackingEnv, twin_of
@@ -46,10 +46,10 @@ def rotation_error(d: Demonstration, hand: RigidHand, motion: Motion) -> float:
 
 
 def test_options_that_are_not_given_leave_names_of_sets_as_they_were():
-    told = told_apart_by(SETTINGS)["capture"]
+    told = fingerprint(SETTINGS)["capture"]
     assert {"method", "axes", "refine"}.isdisjoint(told)
     assert told["cutoff"] == SETTINGS.capture.cutoff
-    changed = told_apart_by(projected(method="paper"))["capture"]
+    changed = fingerprint(projected(method="paper"))["capture"]
     assert changed == told | {"method": "paper"}
 
 

@@ -4,14 +4,14 @@ import jax
 import numpy as np
 
 from envs.demonstrations import twin_hands
-from mjx_hand.files import array_cache as kept_module
+from mjx_hand.files import array_cache
 from mjx_hand.hand.load import load_hand
 from mjx_hand.pytree import replace
 from mjx_hand.rigid.build import build_rigid_hand
 
 
 def test_kept_hands_are_the_built_ones(demonstrations, tmp_path, monkeypatch):
-    monkeypatch.setattr(kept_module, "_cache", lambda: str(tmp_path))
+    monkeypatch.setattr(array_cache, "_cache", lambda: str(tmp_path))
     built = []
 
     def counted(model, shape):
@@ -34,7 +34,7 @@ def test_kept_hands_are_the_built_ones(demonstrations, tmp_path, monkeypatch):
 
 
 def test_another_person_is_another_hand(demonstrations, tmp_path, monkeypatch):
-    monkeypatch.setattr(kept_module, "_cache", lambda: str(tmp_path))
+    monkeypatch.setattr(array_cache, "_cache", lambda: str(tmp_path))
     taller = [replace(d, shape=d.shape + 0.5) for d in demonstrations]
     (one, *_), (other, *_) = twin_hands.twins(demonstrations), twin_hands.twins(taller)
     assert np.abs(one.link_offset - other.link_offset).max() > 1e-4

@@ -10,20 +10,20 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from envs.physics.host_call import HostFunction, call_host
+from envs.physics.host_call import HostCallback, call_host
 
 ROOT = Path(__file__).resolve().parent.parent.parent.parent
 THREE = jax.ShapeDtypeStruct((3,), jnp.float32)
 
 PROGRAM = """
 import jax, jax.numpy as jnp
-from envs.physics.host_call import HostFunction
+from envs.physics.host_call import HostCallback
 hits = []
 jax.monitoring.register_event_listener(lambda event, **_: hits.append(event) if event.endswith("cache_hits") else None)
 jax.config.update("jax_compilation_cache_dir", {folder!r})
 jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
-double = HostFunction(lambda a: (2 * a,))
+double = HostCallback(lambda a: (2 * a,))
 shapes = (jax.ShapeDtypeStruct((3,), jnp.float32),)
 step = jax.jit(lambda a: jax.lax.scan(lambda a, _: (double(shapes, a)[0] + {add}, None), a, length=4)[0])
 ones = jnp.ones(3)
@@ -38,7 +38,7 @@ def affine(a: Any, b: Any) -> tuple[np.ndarray, ...]:
 
 
 def calling(function: Callable[..., Any], *shapes: jax.ShapeDtypeStruct) -> Callable[..., Any]:
-    called = HostFunction(function)
+    called = HostCallback(function)
     return lambda *args: called(shapes, *args)
 
 
@@ -70,7 +70,7 @@ def test_what_goes_wrong_is_told():
 
 
 def test_what_was_compiled_with_one_function_calls_another_by_its_number():
-    double, negate = HostFunction(lambda a: (2 * a,)), HostFunction(lambda a: (-a,))
+    double, negate = HostCallback(lambda a: (2 * a,)), HostCallback(lambda a: (-a,))
     call = jax.jit(jax.vmap(lambda number, a: call_host(number, (THREE,), a)[0], in_axes=(None, 0)))
     a = jnp.arange(6.0).reshape(2, 3)
     np.testing.assert_array_equal(call(jnp.int32(double.number), a), 2 * a)

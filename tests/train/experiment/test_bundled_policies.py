@@ -9,7 +9,7 @@ from envs.evaluation.evaluate import evaluate
 from envs.evaluation.roll_out import make_roll_out, zero_residual
 from mjx_hand.errors import InputError
 from tools import bundle_policy
-from train.experiment.bundled_policies import included_policy, included_world
+from train.experiment.bundled_policies import bundled_policy, bundled_setup
 from train.experiment.setup import chosen_checkpoint
 from train.learning.checkpoint import load_checkpoint
 from train.learning.curve import Point
@@ -38,7 +38,7 @@ def test_what_is_included_is_played_where_nothing_was_trained(
     shown.close()
     assert "playing the policy that comes with mjx-hand" in capsys.readouterr().out
     assert shown.scene.title.startswith("tiny 0: ")
-    kept, best = load_checkpoint(included_policy("tiny") or ""), load_checkpoint(trained[0] / "best.npz")
+    kept, best = load_checkpoint(bundled_policy("tiny") or ""), load_checkpoint(trained[0] / "best.npz")
     for layer in ("hidden_0", "mean_kernel"):
         if layer in best.policy["params"]:
             found, wanted = (c.policy["params"][layer]["kernel"] for c in (kept, best))
@@ -55,13 +55,13 @@ def test_without_one_the_command_that_trains_is_named(untrained: Config):
 def test_the_policies_that_come_along_do_what_the_zero_residual_does_not(name: str):
     """On the demonstration beside each, from frame 0, and still there five seconds later."""
     config = compose([f"config={name}", "engine=native"])
-    config = dataclasses.replace(config, checkpoint=str(included_policy(name)))
-    world = included_world(config)
-    checkpoint = chosen_checkpoint(config, world.env.observation_size)
-    policy = deterministic_policy(config.ppo, world.env.observation_size, world.env.action_size)
-    objects = [d.object for d in world.demonstrations]
-    scores = evaluate(make_roll_out(world.env, world.hands, policy, 5.0)(checkpoint.policy), objects).rows()
+    config = dataclasses.replace(config, checkpoint=str(bundled_policy(name)))
+    setup = bundled_setup(config)
+    checkpoint = chosen_checkpoint(config, setup.env.observation_size)
+    policy = deterministic_policy(config.ppo, setup.env.observation_size, setup.env.action_size)
+    objects = [d.object for d in setup.demonstrations]
+    scores = evaluate(make_roll_out(setup.env, setup.hands, policy, 5.0)(checkpoint.policy), objects).rows()
     assert scores["manip_trans_object"] == scores["hold"] == 1
     assert scores["tracking_error_cm"] < 0.5
-    idle = evaluate(make_roll_out(world.env, world.hands, zero_residual)(None), objects).rows()
+    idle = evaluate(make_roll_out(setup.env, setup.hands, zero_residual)(None), objects).rows()
     assert idle["tracking_error_cm"] > 2 * scores["tracking_error_cm"]

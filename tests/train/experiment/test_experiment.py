@@ -16,30 +16,30 @@ from mjx_hand.pytree import replace
 from mjx_hand.view.browser.viewer import Viewer
 from train.evaluate import evaluate_and_write
 from train.experiment.evaluate_seeds import POLICY, REPLAY, ZERO
-from train.experiment.setup import World, make_world, without_grip
+from train.experiment.setup import TrackingSetup, make_setup, without_grip
 from train.play import viewer
-from train.reports.evaluation_record import made_of
+from train.reports.evaluation_record import evaluation_fingerprint
 from train.settings.config import Config, compose
 from train.settings.options import Play
 from train.view import video
 
 
 def test_it_uses_the_very_sets_of_the_single_types(tmp_path):
-    everything = compose(["config=all", "data.people=2"]).data.of_each_type()
+    everything = compose(["config=all", "data.people=2"]).data.expand_types()
     assert [settings.grasp for settings in everything] == grasp_names()
     for settings in everything:
         alone = compose([f"config={settings.grasp}", "data.people=2"]).data
         assert set_folder(settings, tmp_path) == set_folder(alone, tmp_path)
-    assert compose(["config=pinch"]).data.of_each_type() == (compose(["config=pinch"]).data,)
+    assert compose(["config=pinch"]).data.expand_types() == (compose(["config=pinch"]).data,)
 
 
 def test_the_force_of_a_grip_makes_no_other_demonstrations_and_another_evaluation(monkeypatch, tiny: Config):
-    folder, digest = set_folder(tiny.data, "sets"), made_of([tiny])
+    folder, digest = set_folder(tiny.data, "sets"), evaluation_fingerprint([tiny])
     harder = dataclasses.replace(grasp_type("pinch"), grip_force=99.0)
     for module in ("envs.demonstrations.dataset", "train.reports.evaluation_record"):
         monkeypatch.setattr(f"{module}.grasp_type", lambda name: harder if name == "pinch" else grasp_type(name))
     assert set_folder(tiny.data, "sets") == folder
-    assert made_of([tiny]) != digest
+    assert evaluation_fingerprint([tiny]) != digest
 
 
 @pytest.fixture(scope="module")
@@ -60,13 +60,13 @@ def test_the_types_stand_one_after_the_other(monkeypatch, tiny: Config, everythi
         train.experiment.setup, "make_set", lambda settings, root, report: asked.append(settings) or folder
     )
     monkeypatch.setattr(train.experiment.setup, "load_part", part_of_type)
-    world = make_world(everything, "train")
+    setup = make_setup(everything, "train")
     assert asked == [dataclasses.replace(tiny.data, grasp=name) for name in grasp_names()]
-    assert [d.grasp for d in world.demonstrations] == grasp_names()
-    grip, forces = np.asarray(world.env.reference.grip), [grasp_type(name).grip_force for name in grasp_names()]
+    assert [d.grasp for d in setup.demonstrations] == grasp_names()
+    grip, forces = np.asarray(setup.env.reference.grip), [grasp_type(name).grip_force for name in grasp_names()]
     for row, force in zip(grip, forces, strict=True):
         assert np.allclose(row, grip[0]) == (force == forces[0])
-    assert not np.asarray(without_grip(world).env.reference.grip).any()
+    assert not np.asarray(without_grip(setup).env.reference.grip).any()
 
 
 def test_one_set_is_never_of_all_types(everything: Config, tmp_path):
@@ -77,13 +77,13 @@ def test_one_set_is_never_of_all_types(everything: Config, tmp_path):
 @pytest.mark.slow
 def test_all_types_are_made_trained_evaluated_and_played(everything: Config, tmp_path, monkeypatch):
     config = dataclasses.replace(everything, out=str(tmp_path / "out"), play=Play(port=0))
-    world: World = make_world(config, "train")
-    kinds = {d.object.kind for d in world.demonstrations}
+    setup: TrackingSetup = make_setup(config, "train")
+    kinds = {d.object.kind for d in setup.demonstrations}
     assert kinds == {grasp_type(name).object_kind for name in grasp_names()}
-    points = train.ppo.train(config, world)
+    points = train.ppo.train(config, setup)
     assert points[-1].steps >= config.ppo.num_timesteps
 
-    monkeypatch.setattr(video, "side_by_side", lambda world, rollouts, index, path: Path(path).write_bytes(b"film"))
+    monkeypatch.setattr(video, "side_by_side", lambda setup, rollouts, index, path: Path(path).write_bytes(b"film"))
     folder, (_, _, by_type) = evaluate_and_write([config])
     assert [row[0] for row in by_type.rows] == [*grasp_names(), "mean over the types"]
     assert list(by_type.columns) == ["", POLICY, ZERO, REPLAY, "paper, its own count"]

@@ -11,14 +11,14 @@ from envs.parallel import ParallelEnv
 from envs.tracking import TrackingEnv, twin_of
 from mjx_hand.errors import InputError
 from mjx_hand.pytree import replace
-from train.experiment.setup import World
+from train.experiment.setup import TrackingSetup
 from train.learning.learner import Learner
 from train.settings.config import Config
 
 
 @pytest.fixture(scope="module")
-def learner(tiny: Config, world: World) -> Learner:
-    return Learner(ParallelEnv(world.env), tiny.ppo)
+def learner(tiny: Config, setup: TrackingSetup) -> Learner:
+    return Learner(ParallelEnv(setup.env), tiny.ppo)
 
 
 def different(a: Any, b: Any) -> list[str]:
@@ -46,9 +46,9 @@ def test_an_update_changes_networks_moments_worlds_and_key(learner: Learner):
 
 
 @pytest.fixture(scope="module")
-def other(tiny: Config, world: World) -> ParallelEnv:
+def other(tiny: Config, setup: TrackingSetup) -> ParallelEnv:
     """Another set of the same size: the same demonstration with a lighter object that stands elsewhere."""
-    (demonstration,) = world.demonstrations
+    (demonstration,) = setup.demonstrations
     thing = replace(demonstration.object, mass=0.5 * demonstration.object.mass)
     shift = np.array([0.01, 0.0, 0.0])
     moved = replace(
@@ -58,7 +58,7 @@ def other(tiny: Config, world: World) -> ParallelEnv:
         support_position=demonstration.support_position + shift,
         motion=replace(demonstration.motion, wrist_position=demonstration.motion.wrist_position + shift),
     )
-    return ParallelEnv(TrackingEnv([moved], world.hands, world.env.engine.name, world.env.task))
+    return ParallelEnv(TrackingEnv([moved], setup.hands, setup.env.engine.name, setup.env.task))
 
 
 def test_another_set_of_the_same_size_does_not_compile_again(learner: Learner, other: ParallelEnv, tiny: Config):
@@ -83,20 +83,20 @@ def test_another_set_of_the_same_size_does_not_compile_again(learner: Learner, o
     assert learner.lowered.as_text() == second.lowered.as_text()
 
 
-def test_tables_of_another_size_are_refused(learner: Learner, world: World):
-    two = ParallelEnv(TrackingEnv(2 * list(world.demonstrations), 2 * list(world.hands), "native", world.env.task))
+def test_tables_of_another_size_are_refused(learner: Learner, setup: TrackingSetup):
+    two = ParallelEnv(TrackingEnv(2 * list(setup.demonstrations), 2 * list(setup.hands), "native", setup.env.task))
     tables = learner.placed_tables(two.env.tables)
     with pytest.raises(InputError, match=r"tables of 2 demonstrations x .* do not fit a learner for 1 dem"):
         learner.update(learner.initial(0), 0.0, tables)
 
 
-def test_memory_grows_with_the_worlds(tiny: Config, learner: Learner, world: World):
+def test_memory_grows_with_the_worlds(tiny: Config, learner: Learner, setup: TrackingSetup):
     """A world more needs what its unroll holds, at least: observations of each step."""
-    twice = Learner(ParallelEnv(world.env), dataclasses.replace(tiny.ppo, num_envs=2 * tiny.ppo.num_envs))
+    twice = Learner(ParallelEnv(setup.env), dataclasses.replace(tiny.ppo, num_envs=2 * tiny.ppo.num_envs))
     few, many = learner.memory(), twice.memory()
     assert few is not None
     assert many is not None
-    observations = tiny.ppo.num_envs * tiny.ppo.unroll_length * world.env.observation_size * 4
+    observations = tiny.ppo.num_envs * tiny.ppo.unroll_length * setup.env.observation_size * 4
     assert many - few > observations
 
 
@@ -108,8 +108,8 @@ def test_a_state_that_was_put_away_goes_on_as_if_it_had_not_been(learner: Learne
     assert different(on, back) == []
 
 
-def test_diverged_simulations_are_counted(tiny: Config, world: World):
-    learner = Learner(ParallelEnv(world.env), tiny.ppo)
+def test_diverged_simulations_are_counted(tiny: Config, setup: TrackingSetup):
+    learner = Learner(ParallelEnv(setup.env), tiny.ppo)
     state = learner.initial(0)
     twin = twin_of(state.worlds)
     lost = replace(twin, residual=twin.residual.at[1, 7].set(jnp.nan))  # a finger is told to go nowhere
@@ -119,11 +119,11 @@ def test_diverged_simulations_are_counted(tiny: Config, world: World):
     assert float(metrics["episode/ended"]) >= 1
 
 
-def test_worlds_that_cannot_be_shared_are_refused(tiny: Config, world: World):
+def test_worlds_that_cannot_be_shared_are_refused(tiny: Config, setup: TrackingSetup):
     odd = dataclasses.replace(tiny.ppo)
     object.__setattr__(odd, "num_envs", 5)  # what the configuration itself would refuse, but for one device
     with pytest.raises(InputError, match=r"ppo.num_envs is 5, which 1 devices cannot share .* multiple of 2"):
-        Learner(ParallelEnv(world.env), odd)
+        Learner(ParallelEnv(setup.env), odd)
 
 
 def host_calls(program: str) -> list[str]:
@@ -137,8 +137,8 @@ def host_calls(program: str) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def on_mjx(tiny: Config, world: World) -> Learner:
-    return Learner(ParallelEnv(TrackingEnv(world.demonstrations, world.hands, "mjx", world.env.task)), tiny.ppo)
+def on_mjx(tiny: Config, setup: TrackingSetup) -> Learner:
+    return Learner(ParallelEnv(TrackingEnv(setup.demonstrations, setup.hands, "mjx", setup.env.task)), tiny.ppo)
 
 
 def test_nothing_goes_to_the_host_inside_an_update(on_mjx: Learner, learner: Learner):

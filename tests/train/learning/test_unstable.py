@@ -13,7 +13,7 @@ from envs.tracking import twin_of
 from mjx_hand.errors import InputError
 from mjx_hand.pytree import replace
 from mjx_hand.view.browser.scene import MeshLayer
-from train.experiment.setup import World
+from train.experiment.setup import TrackingSetup
 from train.learning.unstable import UnstableLog, load_unstable, step_again
 from train.play import viewer
 from train.settings.config import Config
@@ -24,9 +24,9 @@ FINGER = 7  # any target of a hinge
 
 
 @pytest.fixture(scope="module")
-def caught(world: World) -> Caught:
+def caught(setup: TrackingSetup) -> Caught:
     """Three worlds; a finger of the second one is told to go nowhere. One step, and another."""
-    parallel = ParallelEnv(world.env, guard=True)
+    parallel = ParallelEnv(setup.env, guard=True)
     state = parallel.reset(jax.random.split(jax.random.key(0), 3))
     twin = twin_of(state)
     lost = replace(twin, residual=twin.residual.at[1, FINGER].set(jnp.nan))
@@ -43,8 +43,8 @@ def test_the_state_before_the_step_is_kept(caught: Caught):
     np.testing.assert_array_equal(caught.action[1], np.full(26, 0.5, np.float32))
 
 
-def test_it_is_written_once_and_steps_again(caught: Caught, world: World, tmp_path: Path):
-    log = UnstableLog(tmp_path / "unstable", world.env, seed=3)
+def test_it_is_written_once_and_steps_again(caught: Caught, setup: TrackingSetup, tmp_path: Path):
+    log = UnstableLog(tmp_path / "unstable", setup.env, seed=3)
     (path,) = log.write(64, caught)
     assert path.name == "000000000064-1.npz"
     assert log.write(96, caught) == []
@@ -52,7 +52,7 @@ def test_it_is_written_once_and_steps_again(caught: Caught, world: World, tmp_pa
     assert (found.seed, found.steps, found.world, found.demonstration) == (3, 64, 1, 0)
     np.testing.assert_array_equal(found.qpos, caught.twin.physics.qpos[1])
     assert np.flatnonzero(np.isnan(found.targets)).tolist() == [FINGER]
-    model, substeps = world.env.engine.models[found.demonstration], world.env.engine.substeps
+    model, substeps = setup.env.engine.models[found.demonstration], setup.env.engine.substeps
     assert len(step_again(model, found, substeps)) == 1, "it diverges again, in the first physics step"
     told = np.where(np.isnan(found.targets), 0.0, found.targets)
     low, high = model.actuator_ctrlrange.T
@@ -68,12 +68,12 @@ def test_another_file_is_refused(tmp_path: Path):
         load_unstable(tmp_path / "x.npz")
 
 
-def test_the_viewer_shows_every_physics_step(caught: Caught, world: World, tiny: Config, tmp_path: Path):
-    (path,) = UnstableLog(tmp_path, world.env, seed=3).write(64, caught)
+def test_the_viewer_shows_every_physics_step(caught: Caught, setup: TrackingSetup, tiny: Config, tmp_path: Path):
+    (path,) = UnstableLog(tmp_path, setup.env, seed=3).write(64, caught)
     found = load_unstable(path)
-    model, substeps = world.env.engine.models[0], world.env.engine.substeps
+    model, substeps = setup.env.engine.models[0], setup.env.engine.substeps
     mended = replace(found, targets=np.where(np.isnan(found.targets), 0.0, found.targets))
-    scene = unstable_scene(mended, world, "tiny")
+    scene = unstable_scene(mended, setup, "tiny")
     assert scene.num_frames == substeps + 1
     assert scene.fps == pytest.approx(1 / model.opt.timestep)
     assert f"seed 3, world 1 at 64 steps: demonstration 0, frame {found.frame}; 5 of 5 physics steps" in scene.title
@@ -82,17 +82,19 @@ def test_the_viewer_shows_every_physics_step(caught: Caught, world: World, tiny:
     for step, qpos in enumerate(step_again(model, mended, substeps)):
         data.qpos[:] = qpos
         mujoco.mj_kinematics(model, data)
-        thing, twin = layers["object"], layers["twin"]
-        assert isinstance(thing, MeshLayer)
+        object_layer, twin = layers["object"], layers["twin"]
+        assert isinstance(object_layer, MeshLayer)
         assert isinstance(twin, MeshLayer)
-        np.testing.assert_allclose(thing.transforms[step, 0, :3, 3], qpos[26:29], atol=1e-6)
+        np.testing.assert_allclose(object_layer.transforms[step, 0, :3, 3], qpos[26:29], atol=1e-6)
         tip = data.body("index3").xpos
         nearest = np.linalg.norm(twin.transforms[step, :, :3, 3] - tip, axis=1).min()
         assert nearest < 1e-5, "the twin's links stand where the engine has them"
 
 
-def test_the_browser_gets_it_by_name(caught: Caught, world: World, trained: object, tiny: Config, tmp_path: Path):
-    (path,) = UnstableLog(tmp_path, world.env, seed=3).write(64, caught)
+def test_the_browser_gets_it_by_name(
+    caught: Caught, setup: TrackingSetup, trained: object, tiny: Config, tmp_path: Path
+):
+    (path,) = UnstableLog(tmp_path, setup.env, seed=3).write(64, caught)
     playing = dataclasses.replace(tiny, play=Play(port=0, unstable=str(path)))
     shown = viewer(playing)
     try:

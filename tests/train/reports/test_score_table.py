@@ -89,8 +89,8 @@ def test_every_failure_is_listed_with_its_reason():
     ],
 )
 def test_objects_are_told_by_their_outer_measures(kind, size, said):
-    thing = ObjectDescription(size=np.array(size), mass=0.1, friction=0.8, kind=kind)
-    assert object_text(thing) == f"{said}, 100 g, friction 0.80"
+    description = ObjectDescription(size=np.array(size), mass=0.1, friction=0.8, kind=kind)
+    assert object_text(description) == f"{said}, 100 g, friction 0.80"
 
 
 def test_nothing_to_show_is_refused():

@@ -57,7 +57,7 @@ def test_what_is_composed_is_frozen_and_hashable():
         ("data.capture.markr_noise=0", "did you mean data.capture.marker_noise?"),
     ],
 )
-def test_an_unknown_key_is_told_the_nearest(override, nearest):
+def test_for_an_unknown_key_the_closest_valid_one_is_suggested(override, nearest):
     assert nearest in refusal(override)
 
 

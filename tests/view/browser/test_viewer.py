@@ -220,8 +220,8 @@ def test_keypoints_beside_the_hand(motion, motions):
 def test_objects_have_their_size(kind, half):
     cube = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * 0.01
     hulls = cube + np.array([[[-0.03, 0, 0]], [[0.03, 0, 0]]]) if kind == "mesh" else np.zeros((0, 0, 3))
-    thing = ObjectDescription(size=np.array([0.02, 0.03, 0.025]), mass=1.0, friction=1.0, hulls=hulls, kind=kind)
-    vertices, faces = object_mesh(thing)
+    description = ObjectDescription(size=np.array([0.02, 0.03, 0.025]), mass=1.0, friction=1.0, hulls=hulls, kind=kind)
+    vertices, faces = object_mesh(description)
     np.testing.assert_allclose(np.ptp(vertices, axis=0) / 2, half, rtol=0.02)
     np.testing.assert_allclose(vertices.max(axis=0), -vertices.min(axis=0), rtol=0.02)
     assert faces.max() < len(vertices)
@@ -230,8 +230,8 @@ def test_objects_have_their_size(kind, half):
 def test_demonstrations_show_object_and_supports(angles):
     scene = demonstration_scene(demonstration(angles, boxes=2), load_hand())
     assert scene.ground == 0.0
-    thing, support = named(scene, "object", MeshLayer), named(scene, "support", MeshLayer)
-    np.testing.assert_allclose(thing.transforms[:, 0, :3, 3], angles.wrist_position)
+    object_layer, support = named(scene, "object", MeshLayer), named(scene, "support", MeshLayer)
+    np.testing.assert_allclose(object_layer.transforms[:, 0, :3, 3], angles.wrist_position)
     assert support.transforms.shape == (40, 2, 4, 4)
     bare = demonstration_scene(demonstration(angles, boxes=0), load_hand())
     assert [layer.name for layer in bare.layers] == ["hand", "rigid twin", "object"]

@@ -14,7 +14,7 @@ from train.benchmark.engines import config
 from train.benchmark.gpu.budget import Budget
 from train.benchmark.gpu.record import Record
 from train.benchmark.gpu.scale import Scale
-from train.experiment.setup import World, make_world
+from train.experiment.setup import World, make_setup
 from train.reports.machine import accelerator
 
 
@@ -51,7 +51,7 @@ class Bench:
     def world(self, engine: str, grasp: str) -> World:
         """The type's small set, which `train.benchmark engines` measures too, on an engine."""
         if (engine, grasp) not in self._worlds:
-            self._worlds[engine, grasp] = make_world(config(engine, grasp, self.demonstrations), "train")
+            self._worlds[engine, grasp] = make_setup(config(engine, grasp, self.demonstrations), "train")
         return self._worlds[engine, grasp]
 
     def say(self, text: str) -> None:

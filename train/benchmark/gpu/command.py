@@ -129,7 +129,7 @@ def _prepared(scale: Scale, root: Path) -> list[str]:
     """The folders of the demonstration sets, made where missing."""
     settings = [config("native", grasp, root).data for grasp in dict.fromkeys(("pinch", *scale.grasps))]
     for name in dict.fromkeys(scale.trainings):
-        settings += gpu_config(name, scale, root, root).data.of_each_type()
+        settings += gpu_config(name, scale, root, root).data.expand_types()
     with contextlib.redirect_stdout(sys.stderr), shares() as report_share:
         return [str(make_set(one, root, report_share)) for one in dict.fromkeys(settings)]
 

@@ -12,7 +12,7 @@ from train.benchmark.gpu.bench import Bench
 from train.benchmark.gpu.record import Record, Table
 from train.benchmark.gpu.scale import gpu_config
 from train.benchmark.learning import measure_learning
-from train.experiment.setup import World, make_world
+from train.experiment.setup import World, make_setup
 from train.learning.curve import Point
 from train.ppo import train
 from train.settings.config import Config
@@ -100,12 +100,12 @@ def _world(bench: Bench, config: Config, record: Record) -> World:
     engine = bench.scale.training_engine or bench.engine
     if config.name not in bench.trained:
         try:
-            world = make_world(dataclasses.replace(config, engine=engine), "train")
+            world = make_setup(dataclasses.replace(config, engine=engine), "train")
         except InputError as error:
             if engine == "native":
                 raise
             record.notes.append(f"Engine {engine} refuses these demonstrations: {error}. Physics is native.")
-            world = make_world(dataclasses.replace(config, engine="native"), "train")
+            world = make_setup(dataclasses.replace(config, engine="native"), "train")
         bench.trained[config.name] = world
     return bench.trained[config.name]
 

@@ -11,7 +11,7 @@ from envs.demonstrations.contacts import demonstration_gaps
 from envs.demonstrations.dataset import SetSettings, set_folder
 from envs.demonstrations.from_recording.demonstration import read_demonstration
 from envs.demonstrations.from_recording.grasp_pose import last_phalanges
-from envs.demonstrations.from_recording.support_plane import find_table, world_from_recording
+from envs.demonstrations.from_recording.support_plane import estimate_support_plane, world_from_recording
 from envs.demonstrations.from_recording.variations import RecordingSettings, vary
 from envs.demonstrations.twin_hands import twins
 from mjx_hand.capture.datasets.dexmv_object import RecordedObject, load_object, recording_files
@@ -43,7 +43,7 @@ def lifted_cube(seed: int, turn: Rotation, frames: int = 80, lift: int = 50) -> 
 @pytest.mark.parametrize("seed", range(3))
 def test_up_is_found_in_a_tilted_recording(seed):
     turn = Rotation.random(rng=np.random.default_rng(seed))
-    table = find_table(lifted_cube(seed, turn))
+    table = estimate_support_plane(lifted_cube(seed, turn))
     assert np.arccos(table.up @ turn.apply([0, 0, 1])) < np.deg2rad(1.5)
     assert abs(table.height - np.array([0.3, -0.2, 0.9]) @ table.up) < 0.006
     assert 50 <= table.lifted <= 56
@@ -56,7 +56,7 @@ def test_up_is_found_in_a_tilted_recording(seed):
 def test_an_object_that_is_never_lifted_is_refused():
     still = lifted_cube(0, Rotation.identity(), lift=200)
     with pytest.raises(InputError, match="stands still in"):
-        find_table(still)
+        estimate_support_plane(still)
 
 
 def reach(frames: int = 150) -> Demonstration:
@@ -116,10 +116,10 @@ def test_what_is_missing_is_said_in_one_line(tmp_path):
 def test_the_real_bottle_stands_and_is_lifted():
     if not FOLDER.is_dir():
         pytest.skip(f"{FOLDER} is absent: the recording is not part of the project")
-    thing = load_object(*recording_files(FOLDER))
-    table = find_table(thing)
+    recorded = load_object(*recording_files(FOLDER))
+    table = estimate_support_plane(recorded)
     assert 70 <= table.lifted <= 80
-    corners = np.einsum("tij,vj->tvi", thing.rotation, thing.vertices[::50]) + thing.position[:, None]
+    corners = np.einsum("tij,vj->tvi", recorded.rotation, recorded.vertices[::50]) + recorded.position[:, None]
     lowest = (corners @ table.up).min(axis=1) - table.height
     assert np.abs(np.median(lowest[: table.standing])) < 0.005
     assert lowest[table.lifted :].min() > -0.005

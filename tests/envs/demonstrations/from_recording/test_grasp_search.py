@@ -1,4 +1,4 @@
-"""Holdings tried in the engine: a cube between finger tips, lifted, by a hand whose recorded place is off."""
+"""Grasps tried in the engine: a cube between finger tips, lifted, by a hand whose recorded place is off."""
 
 import dataclasses
 import itertools
@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from envs.demonstrations.from_recording.grasp_pose import Holding, capsule_gaps
-from envs.demonstrations.from_recording.grasp_rollout import Carrying
-from envs.demonstrations.from_recording.grasp_search import firmest
-from envs.demonstrations.from_recording.grasp_trajectory import Act, take
-from envs.demonstrations.from_recording.observed import Seen
-from envs.demonstrations.from_recording.pregrasp import opened
+from envs.demonstrations.from_recording.grasp_pose import GraspPose, capsule_gaps
+from envs.demonstrations.from_recording.grasp_rollout import GraspRollout
+from envs.demonstrations.from_recording.grasp_search import search_grasp
+from envs.demonstrations.from_recording.grasp_trajectory import Act, grasp_trajectory
+from envs.demonstrations.from_recording.observed import ObservedSequence
+from envs.demonstrations.from_recording.pregrasp import pregrasp
 from envs.demonstrations.scripted.grasp_posture import solve_postures
 from envs.grasps import grasp_type
 from mjx_hand.errors import InputError
@@ -35,41 +35,41 @@ def act() -> Act:
     """An open hand comes from above to a cube on the table and lifts it by 6 cm; captured 1 cm beside where it was."""
     hand = build_rigid_hand(load_hand())
     corners = HALF * np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
-    thing = ObjectDescription(kind="mesh", size=np.full(3, HALF), mass=0.1, friction=0.9, hulls=corners[None])
+    description = ObjectDescription(kind="mesh", size=np.full(3, HALF), mass=0.1, friction=0.9, hulls=corners[None])
     posture = solve_postures(grasp_type("pinch"), [hand], np.full((1, 3), HALF))
     rotation = Rotation.from_matrix(np.asarray(posture.rotation[0], float)).as_matrix()
     angles = np.asarray(posture.angles[0], float)
-    grasp = np.asarray(posture.position[0], float)
+    wrist = np.asarray(posture.position[0], float)
     times = np.arange(FRAMES) / FPS
     height = HALF + 0.06 * np.clip((times - LIFTED) / 0.4, 0.0, 1.0)
     away = 0.1 * np.clip(1.0 - times, 0.0, 1.0)  # the reach
     position = np.stack([0 * times, 0 * times, height], axis=1)
     beside = rotation @ [0.0, 0.01, 0.0]
-    held = Holding(angles=angles, rotation=rotation.T, position=rotation.T @ -(grasp + beside))
-    seen = Seen(
+    held = GraspPose(angles=angles, rotation=rotation.T, position=rotation.T @ -(wrist + beside))
+    observed = ObservedSequence(
         times=times,
-        angles=np.tile(opened(held[None], hand, hull_planes(thing.hulls), 0.03).angles, (FRAMES, 1)),
+        angles=np.tile(pregrasp(held[None], hand, hull_planes(description.hulls), 0.03).angles, (FRAMES, 1)),
         hand_rotation=np.tile(rotation, (FRAMES, 1, 1)),
-        hand_position=position + grasp + beside + away[:, None] * [0.0, 0.0, 1.0],
+        hand_position=position + wrist + beside + away[:, None] * [0.0, 0.0, 1.0],
         rotation=np.tile(np.eye(3), (FRAMES, 1, 1)),
         position=position,
     )
-    return Act(seen=seen, lifted=LIFTED, held=held, hand=hand, thing=thing)
+    return Act(observed=observed, lifted=LIFTED, held=held, hand=hand, object=description)
 
 
 @pytest.fixture(scope="module")
-def good(act) -> Holding:
+def good(act) -> GraspPose:
     """As the cube really lay."""
     return dataclasses.replace(act.held, position=act.held.position + np.array([0.0, 0.01, 0.0]))
 
 
 @pytest.fixture(scope="module")
 def planes(act) -> np.ndarray:
-    return hull_planes(act.thing.hulls)
+    return hull_planes(act.object.hulls)
 
 
 def test_open_fingers_are_off_the_object_and_within_limits(act, good, planes):
-    wide = opened(good[None], act.hand, planes, 0.01)[0]
+    wide = pregrasp(good[None], act.hand, planes, 0.01)[0]
     gaps = np.asarray(capsule_gaps(wide.angles, wide.rotation, wide.position, act.hand, planes))
     closed = np.asarray(capsule_gaps(good.angles, good.rotation, good.position, act.hand, planes))
     assert closed.min() < 0.001
@@ -77,65 +77,65 @@ def test_open_fingers_are_off_the_object_and_within_limits(act, good, planes):
     assert (wide.angles >= act.hand.hinge_lower - 1e-6).all()
     assert (wide.angles <= act.hand.hinge_upper + 1e-6).all()
     far = dataclasses.replace(good, position=good.position + np.array([0.0, -0.3, 0.0]))
-    np.testing.assert_allclose(opened(far[None], act.hand, planes, 0.01).angles[0], good.angles, atol=1e-6)
+    np.testing.assert_allclose(pregrasp(far[None], act.hand, planes, 0.01).angles[0], good.angles, atol=1e-6)
 
 
-def test_a_taking_begins_as_recorded_and_ends_in_the_holding(act, good):
-    way = take(act, good[None])
-    rotation, position = (part[0] for part in way.in_hand)
+def test_a_trajectory_begins_as_recorded_and_ends_in_the_grasp(act, good):
+    trajectory = grasp_trajectory(act, good[None])
+    rotation, position = (part[0] for part in trajectory.in_hand)
     closed = slice(act.closed, None)
     np.testing.assert_allclose(position[closed], np.tile(good.position, (FRAMES - act.closed, 1)), atol=1e-9)
     np.testing.assert_allclose(rotation[closed], np.tile(good.rotation, (FRAMES - act.closed, 1, 1)), atol=1e-9)
-    np.testing.assert_allclose(way.angles[0, closed], np.tile(good.angles, (FRAMES - act.closed, 1)), atol=1e-9)
-    np.testing.assert_allclose(way.wrist_position[0, :5], act.seen.hand_position[:5], atol=1e-9)
-    assert act.seen.times[act.closed] < LIFTED
-    assert np.linalg.norm(np.diff(way.wrist_position[0], axis=0), axis=1).max() < 0.01  # 0.5 m/s
+    np.testing.assert_allclose(trajectory.angles[0, closed], np.tile(good.angles, (FRAMES - act.closed, 1)), atol=1e-9)
+    np.testing.assert_allclose(trajectory.wrist_position[0, :5], act.observed.hand_position[:5], atol=1e-9)
+    assert act.observed.times[act.closed] < LIFTED
+    assert np.linalg.norm(np.diff(trajectory.wrist_position[0], axis=0), axis=1).max() < 0.01  # 0.5 m/s
 
 
-def test_a_holding_off_the_object_is_lost_and_a_good_one_is_not(act, good):
-    pair = Holding(
+def test_a_grasp_off_the_object_is_lost_and_a_good_one_is_not(act, good):
+    pair = GraspPose(
         *(np.stack([a, b]) for a, b in zip(dataclasses.astuple(good), dataclasses.astuple(good), strict=True))
     )
     pair = dataclasses.replace(pair, position=pair.position + np.array([[0.0, 0.0, 0.0], [0.0, -0.04, 0.0]]))
     for fixed in (False, True):
-        carried = Carrying(act, FORCE, 2).carry(pair, fixed=fixed)
-        assert carried.kept[0] == 1.0
-        assert carried.error[0] < 0.01
-        assert carried.kept[1] < 0.95
-        assert np.linalg.norm(carried.settled.position[0] - good.position) < 0.01
+        score = GraspRollout(act, FORCE, 2).carry(pair, fixed=fixed)
+        assert score.held_share[0] == 1.0
+        assert score.error[0] < 0.01
+        assert score.held_share[1] < 0.95
+        assert np.linalg.norm(score.settled.position[0] - good.position) < 0.01
 
 
-def test_a_holding_is_found_that_carries_the_object_in_a_demonstration(act):
+def test_a_grasp_is_found_that_carries_the_object_in_a_demonstration(act):
     """Independent of how it was found: the demonstration's own reference, stepped in MuJoCo from its first frame."""
-    way = take(act, firmest(act, act.held[None], FORCE, tried=48)[None])
+    trajectory = grasp_trajectory(act, search_grasp(act, act.held[None], FORCE, tried=48)[None])
     demonstration = Demonstration(
         motion=JointMotion(
             fps=FPS,
-            angles=way.angles[0],
-            wrist_position=way.wrist_position[0],
-            wrist_quaternion=matrix_quaternions(way.wrist_rotation[0]),
+            angles=trajectory.angles[0],
+            wrist_position=trajectory.wrist_position[0],
+            wrist_quaternion=matrix_quaternions(trajectory.wrist_rotation[0]),
             valid=np.ones(FRAMES, bool),
         ),
-        object_pose=np.concatenate([way.position, matrix_quaternions(way.rotation[0])], axis=1),
-        object=act.thing,
+        object_pose=np.concatenate([trajectory.position, matrix_quaternions(trajectory.rotation[0])], axis=1),
+        object=act.object,
         support=np.zeros((0, 3)),
         support_position=np.zeros((0, 3)),
         shape=np.zeros(10),
         grasp="recorded",
     )
-    thing = unaided(demonstration, act.hand, FORCE)[-1]
-    assert np.linalg.norm(thing[:3] - demonstration.object_pose[-1, :3]) < 0.015
-    turn = Rotation.from_quat(thing[3:], scalar_first=True).magnitude()
+    object_pose = unaided(demonstration, act.hand, FORCE)[-1]
+    assert np.linalg.norm(object_pose[:3] - demonstration.object_pose[-1, :3]) < 0.015
+    turn = Rotation.from_quat(object_pose[3:], scalar_first=True).magnitude()
     assert turn < np.deg2rad(30)
-    rotation, position = way.in_hand
-    planes = hull_planes(act.thing.hulls)
-    gaps = capsule_gaps(way.angles[0, -1], rotation[0, -1], position[0, -1], act.hand, planes)
+    rotation, position = trajectory.in_hand
+    planes = hull_planes(act.object.hulls)
+    gaps = capsule_gaps(trajectory.angles[0, -1], rotation[0, -1], position[0, -1], act.hand, planes)
     assert float(gaps.min()) > -0.003
 
 
 def test_an_object_too_heavy_for_every_one_is_refused(act, good):
-    heavy = dataclasses.replace(act, thing=replace(act.thing, mass=20.0))
+    heavy = dataclasses.replace(act, object=replace(act.object, mass=20.0))
     with pytest.raises(
         InputError, match=r"no posture .* carries the object of 20 kg and friction 0.9 .* lighter object"
     ):
-        firmest(heavy, good[None], FORCE, tried=6)
+        search_grasp(heavy, good[None], FORCE, tried=6)

@@ -37,13 +37,13 @@ def test_the_story_tells_compiling_learning_and_evaluating_apart(bench, tmp_path
 def test_an_engine_that_refuses_the_objects_is_noted_and_physics_is_native(bench, monkeypatch, tmp_path):
     made, world = [], bench.world("native", "pinch")
 
-    def make_world(config, part):
+    def make_setup(config, part):
         made.append(config.engine)
         if config.engine == "warp":
             raise InputError("model 1 differs")
         return world
 
-    monkeypatch.setattr(learning, "make_world", make_world)
+    monkeypatch.setattr(learning, "make_setup", make_setup)
     bench = dataclasses.replace(bench, engine="warp", scale=dataclasses.replace(REHEARSAL, training_engine=None))
     record = Record("learn", "")
     config = learning.gpu_config("all", REHEARSAL, tmp_path, tmp_path)
