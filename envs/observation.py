@@ -34,7 +34,11 @@ def wrist_rotation(turns: Float[Array, "3"], base: Float[Array, "3 3"]) -> Float
 def residual_scale(task: Task) -> Float[Array, "26"]:
     """What a residual of 1 is worth for each target (m, rad)."""
     return jnp.concatenate(
-        [jnp.full(3, task.wrist_move), jnp.full(3, task.wrist_turn), jnp.full(NUM_HINGES, task.finger)]
+        [
+            jnp.full(3, task.residual_scale_wrist_position),
+            jnp.full(3, task.residual_scale_wrist_rotation),
+            jnp.full(NUM_HINGES, task.residual_scale_fingers),
+        ]
     )
 
 
@@ -62,7 +66,7 @@ def observe(
     wrist = wrist_rotation(hand[3:NUM_WRIST], base)
     in_hand = wrist.T @ (object_pose[:3] - base @ hand[:3])
 
-    later = jnp.minimum(frame + jnp.array(task.ahead), reference.length[demonstration] - 1)
+    later = jnp.minimum(frame + jnp.array(task.lookahead), reference.length[demonstration] - 1)
     features = jnp.concatenate(
         [
             (hand - now) * _TARGET_SCALE,

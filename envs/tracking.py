@@ -151,12 +151,12 @@ class TrackingEnv(Env):
         return self.engine.name
 
     def reset(self, rng: Array) -> State:
-        """A training episode: a random demonstration, in its middle with probability `task.mid_start`."""
+        """A training episode: a random demonstration, in its middle with probability `task.random_start_prob`."""
         which, whether, where = jax.random.split(rng, 3)
         demonstration = jax.random.randint(which, (), 0, self.num_demonstrations)
         last = jnp.maximum(self.reference.length[demonstration] - _TAIL, 1)
         frame = jax.random.randint(where, (), 0, last)
-        frame = jnp.where(jax.random.bernoulli(whether, self.task.mid_start), frame, 0)
+        frame = jnp.where(jax.random.bernoulli(whether, self.task.random_start_prob), frame, 0)
         return self.start(demonstration, frame)
 
     def start(self, demonstration: Int[Array, ""], frame: Int[Array, ""]) -> State:
@@ -190,8 +190,8 @@ class TrackingEnv(Env):
 
         position, rotation = self._errors(twin)
         terms = {
-            "reward/position": jnp.exp(-task.position_sharpness * position),
-            "reward/rotation": jnp.exp(-task.rotation_sharpness * rotation),
+            "reward/position": jnp.exp(-task.reward_position_alpha * position),
+            "reward/rotation": jnp.exp(-task.reward_rotation_alpha * rotation),
             "reward/action": -task.action_cost * jnp.sum(action**2),
         }
         done = jnp.maximum((position > task.lost_distance(progress)).astype(jnp.float32), physics.unstable)

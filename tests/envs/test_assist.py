@@ -96,7 +96,7 @@ def test_progress_reaches_every_world_and_survives_restarts(env):
 
 def test_termination_tightens(env):
     """An error of 5 cm ends an episode late in the training, not early."""
-    tight = dataclasses.replace(env.task, lost_at=0.08, lost_at_last=0.04)
+    tight = dataclasses.replace(env.task, termination_distance=0.08, termination_distance_last=0.04)
     at = jnp.asarray(0, jnp.int32), jnp.asarray(0, jnp.int32)
     state = env.start(*at)
     pose = env.reference.object_pose.at[..., 0].add(0.05)

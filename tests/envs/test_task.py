@@ -11,20 +11,20 @@ from mjx_hand.errors import InputError
     ("change", "message"),
     [
         ({"substeps": 0}, "task.substeps is 0; it must be a positive number"),
-        ({"finger": -0.1}, "task.finger is -0.1"),
-        ({"lost_at": float("nan")}, "task.lost_at is nan"),
-        ({"lost_at_last": 0.0}, "task.lost_at_last is 0.0; it must be a positive number"),
+        ({"residual_scale_fingers": -0.1}, "task.residual_scale_fingers is -0.1"),
+        ({"termination_distance": float("nan")}, "task.termination_distance is nan"),
+        ({"termination_distance_last": 0.0}, "task.termination_distance_last is 0.0; it must be a positive number"),
         ({"assist": -1.0}, "task.assist is -1.0; it must lie between 0 and 600"),
         ({"assist": 1e4}, "more shakes the object"),
         ({"assist_until": 0.0}, "task.assist_until is 0.0; it must be a positive number"),
-        ({"wrist_move": float("inf")}, "task.wrist_move is inf"),
+        ({"residual_scale_wrist_position": float("inf")}, "task.residual_scale_wrist_position is inf"),
         ({"smoothing": 1.0}, "would ignore every action"),
         ({"smoothing": 1.5}, "must lie between 0 and 1"),
-        ({"mid_start": -0.1}, "task.mid_start is -0.1; it must lie between 0 and 1"),
+        ({"random_start_prob": -0.1}, "task.random_start_prob is -0.1; it must lie between 0 and 1"),
         ({"action_cost": float("nan")}, "task.action_cost is nan; it must not be negative"),
         ({"grip_force": -1.0}, "task.grip_force is -1.0; it must not be negative"),
-        ({"ahead": ()}, "it must list frames ahead"),
-        ({"ahead": (0, 1)}, "each at least 1"),
+        ({"lookahead": ()}, "it must list frames ahead"),
+        ({"lookahead": (0, 1)}, "each at least 1"),
     ],
 )
 def test_numbers_that_make_no_task_are_refused(change, message):
@@ -33,11 +33,11 @@ def test_numbers_that_make_no_task_are_refused(change, message):
 
 
 def test_equal_tasks_are_one_key():
-    assert {Task(ahead=(1, 2)): "kept"}[dataclasses.replace(Task(), ahead=(1, 2))] == "kept"
+    assert {Task(lookahead=(1, 2)): "kept"}[dataclasses.replace(Task(), lookahead=(1, 2))] == "kept"
 
 
 def test_termination_tightens_and_assistance_fades_with_the_training():
-    task = Task(lost_at=0.1, lost_at_last=0.04, assist=300.0, assist_until=0.5)
+    task = Task(termination_distance=0.1, termination_distance_last=0.04, assist=300.0, assist_until=0.5)
     assert [float(task.lost_distance(jnp.float32(p))) for p in (0.0, 0.5, 1.0)] == pytest.approx([0.1, 0.07, 0.04])
     assert [float(task.assist_stiffness(jnp.float32(p))) for p in (0.0, 0.25, 0.5, 1.0)] == [300, 150, 0, 0]
 

@@ -73,7 +73,7 @@ def test_the_end_truncates_and_holds_the_last_frame(env, start, step):
         done.append(float(state.done))
         truncated.append(float(state.info["truncation"]))
         frames.append(int(state.pipeline_state.frame))
-    lost = float(state.metrics["error/position"]) > env.task.lost_at
+    lost = float(state.metrics["error/position"]) > env.task.termination_distance
     assert frames == [length - 2, length - 1, length - 1, length - 1]
     assert done == [0, 1, 1, 1]
     assert not lost
@@ -86,7 +86,7 @@ def test_losing_the_object_ends_a_rollout_and_is_no_truncation(env, start, step)
     away = at(start, 0, int(env.reference.length[0]) - 5).pipeline_state.physics
     twin = replace(state.pipeline_state, physics=away)
     state = step(state.replace(pipeline_state=twin), jnp.zeros(26))
-    assert float(state.metrics["error/position"]) > env.task.lost_at
+    assert float(state.metrics["error/position"]) > env.task.termination_distance
     assert (float(state.done), float(state.info["truncation"])) == (1, 0)
 
 

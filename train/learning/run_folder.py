@@ -32,6 +32,18 @@ _FREE = (
     "ppo.num_updates",
     "ppo.num_timesteps",
 )
+# What options were called in folders of older trainings.
+_RENAMED = {
+    "task.wrist_move": "task.residual_scale_wrist_position",
+    "task.wrist_turn": "task.residual_scale_wrist_rotation",
+    "task.finger": "task.residual_scale_fingers",
+    "task.position_sharpness": "task.reward_position_alpha",
+    "task.rotation_sharpness": "task.reward_rotation_alpha",
+    "task.lost_at": "task.termination_distance",
+    "task.lost_at_last": "task.termination_distance_last",
+    "task.mid_start": "task.random_start_prob",
+    "task.ahead": "task.lookahead",
+}
 
 
 @contextlib.contextmanager
@@ -103,7 +115,8 @@ def _alone_in(path: Path) -> Iterator[None]:
 
 def _check_same(config: Config, written: Path) -> None:
     # An option that there was not yet when the folder was written had what is now its default.
-    before, now = _settings(_plain(Config())) | _settings(_read(written)), _settings(_plain(config))
+    saved = {_RENAMED.get(name, name): value for name, value in _settings(_read(written)).items()}
+    before, now = _settings(_plain(Config())) | saved, _settings(_plain(config))
     differing = [name for name in sorted(before.keys() | now.keys()) if before.get(name) != now.get(name)]
     if differing:
         name = differing[0]

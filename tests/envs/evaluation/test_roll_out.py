@@ -36,8 +36,8 @@ def test_nothing_ends_a_rollout_early(env, hands):
     error = np.linalg.norm(thrown.object_pose[..., :3] - thrown.object_reference[..., :3], axis=-1)
     length = np.asarray(env.reference.length)
     for k, n in enumerate(length):
-        assert error[k, n - 1] > env.task.lost_at
-        lost = np.argmax(error[k] > env.task.lost_at)
+        assert error[k, n - 1] > env.task.termination_distance
+        lost = np.argmax(error[k] > env.task.termination_distance)
         assert thrown.counted[k, lost:n].all()
         assert not np.array_equal(thrown.qpos[k, n - 2], thrown.qpos[k, 0])  # no restart
 

@@ -161,3 +161,15 @@ def test_killed_at_once_it_goes_on(trained: Trained, tiny: Config, tmp_path):
     assert done.returncode == 0, done.stderr[-2000:]
     assert "going on from" in done.stdout
     same_results(trained[0], tmp_path)
+
+
+def test_a_folder_from_when_options_had_other_names_is_gone_on_with(tiny: Config, setup: TrackingSetup, tmp_path):
+    config = in_folder(tiny, tmp_path)
+    run(shortened(config, 32), setup)
+    written = tmp_path / "config.yaml"
+    text = written.read_text()
+    assert "\n  termination_distance: " in text
+    written.write_text(
+        text.replace("  termination_distance:", "  lost_at:").replace("  residual_scale_fingers:", "  finger:")
+    )
+    assert [p.steps for p in run(config, setup)] == [0, 32, 64]

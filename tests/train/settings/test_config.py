@@ -40,10 +40,15 @@ def test_without_overrides_the_values_are_those_of_the_dataclasses():
 
 
 def test_what_is_composed_is_frozen_and_hashable():
-    config = compose(["task.ahead=[2,9]", "ppo.policy_layers=[32,16]", "ppo.value_layers=[8]"])
-    assert (config.task.ahead, config.ppo.policy_layers, config.ppo.value_layers) == ((2, 9), (32, 16), (8,))
+    config = compose(["task.lookahead=[2,9]", "ppo.policy_layers=[32,16]", "ppo.value_layers=[8]"])
+    assert (config.task.lookahead, config.ppo.policy_layers, config.ppo.value_layers) == ((2, 9), (32, 16), (8,))
     hash(config)
-    for part, field in ((config, "seed"), (config.ppo, "num_envs"), (config.task, "ahead"), (config.checks, "every")):
+    for part, field in (
+        (config, "seed"),
+        (config.ppo, "num_envs"),
+        (config.task, "lookahead"),
+        (config.checks, "every"),
+    ):
         with pytest.raises(dataclasses.FrozenInstanceError):
             setattr(part, field, 1)
 
@@ -76,8 +81,8 @@ def test_an_unknown_key_is_told_the_valid_ones():
     [
         ("ppo.num_envs=many", ("'many'", "ppo.num_envs")),
         ("seed=1.5", ("'1.5'", "seed")),
-        ("task.ahead=3", ("task.ahead",)),
-        ("task.ahead=[0]", ("task.ahead is (0,)", "at least 1")),
+        ("task.lookahead=3", ("task.lookahead",)),
+        ("task.lookahead=[0]", ("task.lookahead is (0,)", "at least 1")),
         ("task.smoothing=1", ("task.smoothing is 1", "give less")),
         ("ppo=3", ("ppo",)),
         ("ppo.num_envs", ("ppo.num_envs", "EQUAL")),
