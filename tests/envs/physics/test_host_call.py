@@ -75,7 +75,7 @@ def test_what_was_compiled_with_one_function_calls_another_by_its_number():
     a = jnp.arange(6.0).reshape(2, 3)
     np.testing.assert_array_equal(call(jnp.int32(double.number), a), 2 * a)
     np.testing.assert_array_equal(call(jnp.int32(negate.number), a), -a)
-    assert call._cache_size() == 1
+    assert call._cache_size() == 1  # type: ignore[attr-defined]
     each = jax.jit(jax.vmap(lambda number, a: call_host(number, (THREE,), a)[0]))
     with pytest.raises(jax.errors.JaxRuntimeError, match="these elements of a batch name several"):
         jax.block_until_ready(each(jnp.array([double.number, negate.number]), a))

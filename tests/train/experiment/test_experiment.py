@@ -81,7 +81,7 @@ def test_all_types_are_made_trained_evaluated_and_played(everything: Config, tmp
     kinds = {d.object.kind for d in setup.demonstrations}
     assert kinds == {grasp_type(name).object_kind for name in grasp_names()}
     points = train.ppo.train(config, setup)
-    assert points[-1].steps >= config.ppo.num_timesteps
+    assert points[-1].steps >= config.ppo.budget * config.ppo.steps_per_update
 
     monkeypatch.setattr(video, "side_by_side", lambda setup, rollouts, index, path: Path(path).write_bytes(b"film"))
     folder, (_, _, by_type) = evaluate_and_write([config])

@@ -64,7 +64,10 @@ def other(tiny: Config, setup: TrackingSetup) -> ParallelEnv:
 def test_another_set_of_the_same_size_does_not_compile_again(learner: Learner, other: ParallelEnv, tiny: Config):
     """Within a process, where it is compiled once, and from process to process, where the program's text counts."""
     compiled = []
-    listen = lambda event, seconds, **_: compiled.append(event)  # noqa: E731
+
+    def listen(event: str, duration_secs: float, **_: Any) -> None:
+        compiled.append(event)
+
     learner.update(learner.initial(0), 0.0)
     jax.monitoring.register_event_duration_secs_listener(listen)
     try:
@@ -126,8 +129,9 @@ def test_worlds_that_cannot_be_shared_are_refused(tiny: Config, setup: TrackingS
         Learner(ParallelEnv(setup.env), odd)
 
 
-def host_calls(program: str) -> list[str]:
+def host_calls(program: str | None) -> list[str]:
     """What a program (StableHLO or HLO) exchanges with the host, by the names that XLA, JAX and this project have."""
+    assert program is not None
     called = {a or b for a, b in re.findall(r'custom_call @(\w+)|custom_call_target="(\w+)"', program)}
     exchanged = set(
         re.findall(r"\b(infeed|outfeed|send|recv)(?:-done)?\(|stablehlo\.(infeed|outfeed|send|recv)\b", program)

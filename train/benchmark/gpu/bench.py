@@ -1,4 +1,4 @@
-"""What the stages of the GPU benchmark share: sizes, time, the engine, and worlds that are made once."""
+"""What the stages of the GPU benchmark share: sizes, time, the engine, and environments that are made once."""
 
 import contextlib
 import dataclasses
@@ -14,7 +14,7 @@ from train.benchmark.engines import config
 from train.benchmark.gpu.budget import Budget
 from train.benchmark.gpu.record import Record
 from train.benchmark.gpu.scale import Scale
-from train.experiment.setup import World, make_setup
+from train.experiment.setup import TrackingSetup, make_setup
 from train.reports.machine import accelerator
 
 
@@ -36,7 +36,7 @@ class Bench:
         out: folder for results.
         demonstrations: folder below which demonstration sets are kept, and made where missing.
         contestants: engines that are compiled and will be needed again, by engine, grasp type and number of worlds.
-        trained: worlds that were made to train in, by the experiment's name.
+        trained: what trainings run in, by the experiment's name.
     """
 
     scale: Scale
@@ -45,14 +45,14 @@ class Bench:
     out: Path
     demonstrations: Path
     contestants: dict[tuple[str, str, int], Contestant] = dataclasses.field(default_factory=dict)
-    trained: dict[str, World] = dataclasses.field(default_factory=dict)
-    _worlds: dict[tuple[str, str], World] = dataclasses.field(default_factory=dict)
+    trained: dict[str, TrackingSetup] = dataclasses.field(default_factory=dict)
+    _setups: dict[tuple[str, str], TrackingSetup] = dataclasses.field(default_factory=dict)
 
-    def world(self, engine: str, grasp: str) -> World:
+    def setup(self, engine: str, grasp: str) -> TrackingSetup:
         """The type's small set, which `train.benchmark engines` measures too, on an engine."""
-        if (engine, grasp) not in self._worlds:
-            self._worlds[engine, grasp] = make_setup(config(engine, grasp, self.demonstrations), "train")
-        return self._worlds[engine, grasp]
+        if (engine, grasp) not in self._setups:
+            self._setups[engine, grasp] = make_setup(config(engine, grasp, self.demonstrations), "train")
+        return self._setups[engine, grasp]
 
     def say(self, text: str) -> None:
         """A line of progress with the time that is left."""

@@ -12,7 +12,7 @@ from train.benchmark.gpu.bench import Bench
 from train.benchmark.gpu.record import Record, Table
 from train.benchmark.gpu.scale import gpu_config
 from train.benchmark.learning import measure_learning
-from train.experiment.setup import World, make_setup
+from train.experiment.setup import TrackingSetup, make_setup
 from train.learning.curve import Point
 from train.ppo import train
 from train.settings.config import Config
@@ -26,11 +26,11 @@ SPEED_COLUMNS = (
 
 def speed(bench: Bench, engine: str, setup: str, worlds: int, table: Table) -> None:
     """PPO's control steps a second on the pinch, a row of the table."""
-    world = bench.world(engine, "pinch")
+    made = bench.setup(engine, "pinch")
     config = gpu_config("pinch", bench.scale, bench.demonstrations, bench.out)
-    alone = bench.contestants.get((engine, "pinch", worlds)) or physics(world.env, worlds)
-    around = environment(world.env, worlds)
-    found = measure_learning(config, world, alone, around, bench.scale.runs, bench.scale.seconds)
+    alone = bench.contestants.get((engine, "pinch", worlds)) or physics(made.env, worlds)
+    around = environment(made.env, worlds)
+    found = measure_learning(config, made, alone, around, bench.scale.runs, bench.scale.seconds)
     shares = (f"{found.physics_share:.0%}", f"{found.learner_share:.0%}")
     rate = found.rate
     table.add("pinch", setup, worlds, rate.median, rate.least, rate.greatest, *shares, found.compile_seconds)
@@ -61,8 +61,8 @@ def to_success(
     config = gpu_config(name, bench.scale, bench.demonstrations, bench.out / folder)
     config = _longer(config, bench.scale.long_steps) if further else dataclasses.replace(config, fresh=True)
     with bench.timed() as making:
-        world = _world(bench, config, record)
-    engine = world.env.engine.name
+        setup = _setup(bench, config, record)
+    engine = setup.env.engine.name
     config = dataclasses.replace(config, engine=engine)
     table = record.table("steps", "seconds", "of them evaluating", "success", "tracking error, cm")
     moments: list[Moment] = []
@@ -78,9 +78,12 @@ def to_success(
             keep()
         return not bench.budget.fits(_SAVING)
 
-    points = train(config, world, watch)
+    points = train(config, setup, watch)
     record.notes.insert(0, _story(config, engine, making[0], moments, points, bench.scale.learned))
-    if points[-1].steps < config.ppo.num_timesteps and points[-1].success < config.checks.stop_at:
+    if (
+        points[-1].steps < config.ppo.budget * config.ppo.steps_per_update
+        and points[-1].success < config.checks.stop_at
+    ):
         record.left_out.append(f"what comes after {points[-1].steps:,} steps")
     steps, success = (np.array([getattr(p, field) for p in points], float) for field in ("steps", "success"))
     record.figures[f"curve-{record.name}"] = plots.learning_curve(steps, success)
@@ -95,18 +98,18 @@ def _longer(config: Config, steps: int) -> Config:
     return dataclasses.replace(config, ppo=ppo, checks=checks)
 
 
-def _world(bench: Bench, config: Config, record: Record) -> World:
+def _setup(bench: Bench, config: Config, record: Record) -> TrackingSetup:
     """The training part, made once; on the host's engine, and that is noted, where the GPU's refuses its objects."""
     engine = bench.scale.training_engine or bench.engine
     if config.name not in bench.trained:
         try:
-            world = make_setup(dataclasses.replace(config, engine=engine), "train")
+            setup = make_setup(dataclasses.replace(config, engine=engine), "train")
         except InputError as error:
             if engine == "native":
                 raise
             record.notes.append(f"Engine {engine} refuses these demonstrations: {error}. Physics is native.")
-            world = make_setup(dataclasses.replace(config, engine="native"), "train")
-        bench.trained[config.name] = world
+            setup = make_setup(dataclasses.replace(config, engine="native"), "train")
+        bench.trained[config.name] = setup
     return bench.trained[config.name]
 
 
@@ -116,7 +119,7 @@ def _story(
     """Where the time went, in a sentence or two."""
     first = moments[0]
     told = (
-        f"{config.name} on {engine}, {config.ppo.num_envs:,} worlds; world made in {making:.1f} s; compiling, "
+        f"{config.name} on {engine}, {config.ppo.num_envs:,} worlds; environment made in {making:.1f} s; compiling, "
         f"the first update and the first evaluation took {first.seconds:.1f} s."
     )
     done = next((m for m in moments if m.point.success >= learned), None)

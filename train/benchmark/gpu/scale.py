@@ -21,8 +21,8 @@ class Scale:
         host_worlds: the same for engines on the host.
         training_engine: what trainings run on; the measured engine if None.
         trainings: experiments that are trained until they are learned.
-        ppo: what differs from an experiment's own learning.
-        checks: control steps between evaluations.
+        ppo: what differs from the GPU's preset of learning.
+        checks: control steps between evaluations; the training's own choice if None.
         data: what differs from an experiment's own demonstrations.
         learned: share of the training demonstrations at which a training ends.
         most_steps: control steps after which a training ends in any case.
@@ -43,8 +43,8 @@ class Scale:
     host_worlds: int = 1024
     training_engine: str | None = None
     trainings: tuple[str, ...] = ("pinch", "all")
-    ppo: dict[str, Any] = dataclasses.field(default_factory=lambda: {"num_envs": 8192, "num_minibatches": 32})
-    checks: int = 10 * 8192 * 16
+    ppo: dict[str, Any] = dataclasses.field(default_factory=dict)
+    checks: int | None = None
     data: dict[str, Any] = dataclasses.field(default_factory=dict)
     learned: float = 0.95
     most_steps: int = 50_000_000
@@ -80,8 +80,8 @@ REHEARSAL = Scale(
 
 
 def gpu_config(name: str, scale: Scale, demonstrations: Path, out: Path) -> Config:
-    """The experiment called `name` with many worlds, which few updates of many gradient steps learn from."""
-    config = compose([f"config={name}"])
+    """The experiment called `name` as it is trained on a GPU, at this scale."""
+    config = compose([f"config={name}", "device=gpu"])
     return dataclasses.replace(
         config,
         out=str(out),

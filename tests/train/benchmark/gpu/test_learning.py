@@ -26,7 +26,7 @@ def test_the_story_tells_compiling_learning_and_evaluating_apart(bench, tmp_path
     moments = [moment(40.0, 12.0, 0.0), moment(50.0, 16.0, 0.5), moment(65.0, 20.0, 0.97, 4000)]
     points = [each.point for each in moments]
     story = learning._story(config, "warp", 3.0, moments, points, 0.95)
-    assert "world made in 3.0 s" in story
+    assert "environment made in 3.0 s" in story
     assert "the first update and the first evaluation took 40.0 s" in story
     assert "after 65.0 s and 4,000 steps" in story
     assert "17.0 s of learning" in story
@@ -35,19 +35,19 @@ def test_the_story_tells_compiling_learning_and_evaluating_apart(bench, tmp_path
 
 
 def test_an_engine_that_refuses_the_objects_is_noted_and_physics_is_native(bench, monkeypatch, tmp_path):
-    made, world = [], bench.world("native", "pinch")
+    made, setup = [], bench.setup("native", "pinch")
 
     def make_setup(config, part):
         made.append(config.engine)
         if config.engine == "warp":
             raise InputError("model 1 differs")
-        return world
+        return setup
 
     monkeypatch.setattr(learning, "make_setup", make_setup)
     bench = dataclasses.replace(bench, engine="warp", scale=dataclasses.replace(REHEARSAL, training_engine=None))
     record = Record("learn", "")
     config = learning.gpu_config("all", REHEARSAL, tmp_path, tmp_path)
-    assert learning._world(bench, config, record) is world
+    assert learning._setup(bench, config, record) is setup
     assert made == ["warp", "native"]
     assert record.notes == ["Engine warp refuses these demonstrations: model 1 differs. Physics is native."]
 
