@@ -13,7 +13,7 @@ from train.benchmark.gpu.record import Record, Table
 from train.benchmark.gpu.scale import gpu_config
 from train.benchmark.learning import measure_learning
 from train.experiment.setup import TrackingSetup, make_setup
-from train.learning.curve import Point
+from train.learning.curve import Point, is_finished
 from train.ppo import train
 from train.settings.config import Config
 
