@@ -80,10 +80,7 @@ def to_success(
 
     points = train(config, setup, watch)
     record.notes.insert(0, _story(config, engine, making[0], moments, points, bench.scale.learned))
-    if (
-        points[-1].steps < config.ppo.budget * config.ppo.steps_per_update
-        and points[-1].success < config.checks.stop_at
-    ):
+    if not is_finished(config, points):
         record.left_out.append(f"what comes after {points[-1].steps:,} steps")
     steps, success = (np.array([getattr(p, field) for p in points], float) for field in ("steps", "success"))
     record.figures[f"curve-{record.name}"] = plots.learning_curve(steps, success)
