@@ -22,7 +22,7 @@ _TARGET_SCALE = np.concatenate([np.full(3, 50.0), np.full(3, 5.0), np.full(NUM_H
 _SPEED_SCALE = np.concatenate([np.full(3, 5.0), np.full(3, 0.5), np.full(NUM_HINGES, 0.2)])
 _FEATURE_SCALE = np.concatenate([[30.0, 30.0, 30.0, 5.0, 1.0], np.ones(len(OBJECT_KINDS))])
 _LENGTH_SCALE = 30.0  # 1/m for errors of the object, 3 cm
-_LIMIT = 5.0
+OBSERVATION_LIMIT = 5.0
 
 
 def wrist_rotation(turns: Float[Array, "3"], base: Float[Array, "3 3"]) -> Float[Array, "3 3"]:
@@ -85,4 +85,4 @@ def observe(
             reference.features[demonstration] * _FEATURE_SCALE,
         ]
     )
-    return jnp.clip(features, -_LIMIT, _LIMIT)
+    return jnp.clip(features, -OBSERVATION_LIMIT, OBSERVATION_LIMIT)

@@ -17,6 +17,7 @@ FLOORS = (
     ("tools",),
     ("train",),
     ("envs",),
+    ("mjx_hand.__main__",),
     ("mjx_hand.cli",),
     ("mjx_hand.view",),
     ("mjx_hand.retarget", "mjx_hand.robots"),

@@ -1,6 +1,6 @@
-"""`make ablations`: what each part of the method is worth, at equal budgets, with three seeds, on one page.
+"""What each part of the method is worth, at equal budgets, with three seeds, on one page: `make ablations`.
 
-    python -m train.ablations [names=[spherical]] [variants=["no grip"]] [results=FOLDER] [any override of train.ppo]
+    mjx-hand ablations [names=[spherical]] [variants=["no grip"]] [results=FOLDER] [any override of train.ppo]
 
 Trains and evaluates every variant of `train/reports/ablations_variants.py`, or those of `variants`, of the experiments
 of `names` (spherical, the hardest), 300,000 control steps a training unless ppo.num_timesteps says otherwise. Overrides

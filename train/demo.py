@@ -1,6 +1,6 @@
-"""`make demo`: a recording is retargeted, a pinch policy is trained, and a report shows what came of it.
+"""A recording is retargeted, a pinch policy is trained, and a report shows what came of it: `make demo`.
 
-    python -m train.demo [config=pinch_demo] [any override of train.ppo]
+    mjx-hand demo [config=pinch_demo] [any override of train.ppo]
 
 With a `config` of its own it makes the same report for any experiment.
 """
@@ -154,7 +154,12 @@ def _learning_curve(points: list[Point]) -> Figure:
     )
 
 
-if __name__ == "__main__":
+def command_line() -> None:
+    """The command, with this process's arguments, and an experiment of its own unless one is given."""
     if not any(argument.startswith("config=") for argument in sys.argv[1:]):
         sys.argv.insert(1, "config=pinch_demo")
     command(main)
+
+
+if __name__ == "__main__":
+    command_line()

@@ -1,4 +1,4 @@
-"""Evaluate checkpoints on held-out demonstrations: `python -m train.evaluate config=pinch seeds=[0,1,2]`.
+"""Evaluate checkpoints on held-out demonstrations: `mjx-hand evaluate config=pinch seeds=[0,1,2]`.
 
 Every rollout counts, from frame 0, unassisted. Beside the policies, the best of each seed, stand two baselines without
 learning: the same reference with a residual of zero, and the demonstration replayed as it is. Writes `evaluation.html`,
@@ -52,5 +52,10 @@ def main(configs: Sequence[Config]) -> None:
     print(f"written: {(out / 'evaluation.html').resolve()}, evaluation.json and evaluation.csv")
 
 
-if __name__ == "__main__":
+def command_line() -> None:
+    """The command, with this process's arguments."""
     command_of_seeds(main)
+
+
+if __name__ == "__main__":
+    command_line()

@@ -1,4 +1,4 @@
-"""Play a policy in the browser, in real time: `python -m train.play config=pinch`.
+"""Play a policy in the browser, in real time: `mjx-hand play config=pinch`.
 
 Shows a held-out demonstration, its twin under the policy, the object, and the error. `play.demonstration=3` chooses
 one; without it, the one of median tracking error. What has not been trained here is played by the policy that comes
@@ -78,5 +78,10 @@ def main(config: Config) -> None:
     shown.wait()
 
 
-if __name__ == "__main__":
+def command_line() -> None:
+    """The command, with this process's arguments."""
     command(main)
+
+
+if __name__ == "__main__":
+    command_line()

@@ -1,4 +1,4 @@
-"""Train a residual tracking policy with Brax PPO: `python -m train.ppo config=pinch ppo.num_envs=512 seed=3`.
+"""Train a residual tracking policy with Brax PPO: `mjx-hand train config=pinch ppo.num_envs=512 seed=3`.
 
 Writes to the experiment's `out` folder: `best.npz` and `last.npz` (policies), `state/` (all it takes to go on),
 `curve.csv` (evaluations), `config.yaml`, and TensorBoard logs. A training that was stopped, killed even, goes on from
@@ -249,5 +249,10 @@ def main(config: Config) -> Mapping[str, str]:
     }
 
 
-if __name__ == "__main__":
+def command_line() -> None:
+    """The command, with this process's arguments."""
     sweepable_command(main)
+
+
+if __name__ == "__main__":
+    command_line()

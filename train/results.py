@@ -1,6 +1,6 @@
-"""`make results`: train what is not trained yet, evaluate it, and write all results on one page.
+"""Train what is not trained yet, evaluate it, and write all results on one page: `make results`.
 
-    python -m train.results [names=[power,pinch]] [seeds=[0,1,2]] [results=FOLDER] [any override of train.ppo]
+    mjx-hand results [names=[power,pinch]] [seeds=[0,1,2]] [results=FOLDER] [any override of train.ppo]
 
 Without `names` the paper's five grasp types; any experiment of `configs/config` may be named. Overrides, such as
 `ppo.num_timesteps=300000`, hold for all of them. Writes `index.html`, `results.md` and `results.json` to `results`

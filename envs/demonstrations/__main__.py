@@ -1,4 +1,4 @@
-"""Make a demonstration set, check it and show it: `python -m envs.demonstrations config=power data.people=2`.
+"""Make a demonstration set, check it and show it: `mjx-hand demonstrations config=power data.people=2`.
 
 Takes the `data` part of an experiment's configuration (`configs/config/NAME.yaml`) and overrides of it, and
 `demonstrations=FOLDER`, below which sets are kept. Prints what came of all attempts and how good the demonstrations
@@ -129,9 +129,15 @@ def _range(values: np.ndarray) -> str:
     return f"{values.min():.1f} to {values.max():.1f}"
 
 
-if __name__ == "__main__":
+def command_line() -> int:
+    """The command, with this process's arguments; the exit status: 0, or 2 for input that cannot be used."""
     try:
         main(sys.argv[1:])
     except InputError as error:
         print(f"demonstrations: {error}", file=sys.stderr)
-        sys.exit(2)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(command_line())

@@ -1,4 +1,4 @@
-"""The command `mjx-hand`: one file a subcommand beside this one."""
+"""The command `mjx-hand`: one file a subcommand beside this one, and those of other packages."""
 
 import importlib
 import os
@@ -8,6 +8,7 @@ from typing import Any
 
 import tyro
 
+from mjx_hand.cli.plugin_commands import plugin_commands, run_plugin, summary
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 
@@ -16,6 +17,18 @@ COMMANDS = ("build", "fit", "info", "keypoints", "retarget", "robot", "track", "
 
 def _function(command: str) -> Callable[..., Any]:
     return getattr(importlib.import_module(f"mjx_hand.cli.{command}"), command)
+
+
+def _all_functions() -> dict[str, Callable[..., Any]]:
+    """What the help lists. Subcommands of other packages read their arguments themselves, before this is looked at."""
+    functions = {command: _function(command) for command in COMMANDS}
+    for name, point in plugin_commands().items():
+
+        def described() -> None: ...
+
+        described.__doc__ = summary(point)
+        functions[name] = described
+    return functions
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -27,16 +40,18 @@ def main(argv: Sequence[str] | None = None) -> int:
         argv: the arguments; the process's own if None.
 
     Raises:
-        SystemExit: by tyro, after `--help` (0) and for unknown or missing options (2).
+        SystemExit: by tyro, after `--help` (0) and for unknown or missing options (2), or by another package's
+            subcommand.
     """
     argv = sys.argv[1:] if argv is None else argv
     try:
+        if argv and argv[0] not in COMMANDS and (plugin := plugin_commands().get(argv[0])):
+            return run_plugin(plugin, argv[1:])
         enable_compile_cache()
         if argv and argv[0] in COMMANDS:  # one command's module alone: importing all of them takes a second
             status = tyro.cli(_function(argv[0]), prog=f"mjx-hand {argv[0]}", args=argv[1:])
         else:
-            functions = {command: _function(command) for command in COMMANDS}
-            status = tyro.extras.subcommand_cli_from_dict(functions, prog="mjx-hand", args=argv)
+            status = tyro.extras.subcommand_cli_from_dict(_all_functions(), prog="mjx-hand", args=argv)
     except InputError as error:
         print(f"mjx-hand: {error}", file=sys.stderr)
         return 2

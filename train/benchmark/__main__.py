@@ -1,4 +1,4 @@
-"""`python -m train.benchmark [NAME]`: what this machine does, by a module of `MODULES`.
+"""Measure what this machine does, by a module of `MODULES`: `mjx-hand bench [NAME]`.
 
 Where none is named, by all but those of `BY_NAME`.
 """
