@@ -34,7 +34,7 @@ def cup() -> trimesh.Trimesh:
 def main() -> None:
     """Drop the cup beside the hand and see it come to rest."""
     mesh = cup()
-    hulls = convex_pieces(mesh.vertices, mesh.faces, most=16)  # (pieces, corners, 3), m
+    hulls = convex_pieces(mesh.vertices, mesh.faces, concavity=0.1)  # (pieces, corners, 3), m
     print(f"{len(mesh.faces)} triangles became {len(hulls)} convex pieces")
     size = np.abs(mesh.vertices).max(axis=0)
     description = ObjectDescription(size=size, mass=0.2, friction=0.8, hulls=hulls, kind="mesh")
