@@ -11,7 +11,7 @@ NEWEST := .venv-newest
 WARP := $(shell sed -n 's/^warp = .*warp-lang==\([0-9.]*\).*/\1/p' pyproject.toml)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo results ablations test test-slow smoke lint format types bench lock clean
+.PHONY: help setup demo results ablations test test-slow smoke lint format types docs bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -77,13 +77,16 @@ format: $(STAMP)  ## mend what lint can mend
 types: $(STAMP)  ## check the types
 	$(BIN)/pyright
 
+docs: $(STAMP)  ## build the documentation into site/, warnings as errors
+	$(BIN)/zensical build --strict --clean
+
 bench: $(STAMP)  ## measure this machine: engines, solver settings, projection (a quarter of an hour)
 	$(BIN)/python -m train.benchmark
 
 lock: $(STAMP)  ## resolve requirements.lock again from pyproject.toml
 	UV_CUSTOM_COMPILE_COMMAND="make lock" $(BIN)/uv pip compile --quiet --upgrade --universal --generate-hashes --no-annotate \
-	  --no-emit-index-url --no-emit-find-links --extra dev --python-version 3.11 pyproject.toml -o requirements.lock
+	  --no-emit-index-url --no-emit-find-links --extra dev --extra docs --python-version 3.11 pyproject.toml -o requirements.lock
 
 clean:  ## remove build products and caches of this folder (not .venv, not results)
-	rm -rf build dist .pytest_cache .ruff_cache .hypothesis .jax_cache *.egg-info
+	rm -rf build dist site .cache .pytest_cache .ruff_cache .hypothesis .jax_cache *.egg-info
 	find . -path ./$(VENV) -prune -o -name __pycache__ -type d -print0 | xargs -0 rm -rf
