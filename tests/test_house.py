@@ -29,9 +29,10 @@ FLOORS = (
     ("mjx_hand.hand.joints",),  # the order of all arrays
     ("mjx_hand.files",),
     ("mjx_hand.rotations", "mjx_hand.pytree", "mjx_hand.compile_cache", "mjx_hand.progress", "mjx_hand.plugins"),
-    ("mjx_hand.errors",),
+    ("mjx_hand.errors", "mjx_hand.lazy_exports"),
 )
-FRONT_DOOR = "mjx_hand"  # re-exports the public names, so it opens on every room and no module goes through it
+# Re-export the public names, so they open on every room of their package and no module goes through them.
+FRONT_DOORS = ("mjx_hand", "envs", "train")
 
 
 def module_name(path: Path) -> str:
@@ -68,12 +69,12 @@ def test_imports_run_downwards():
     wrong = []
     for path in MODULES:
         name = module_name(path)
-        if name == FRONT_DOOR:
+        if name in FRONT_DOORS:
             continue
         floor, room = place(name)
         for imported in set(imports(path)):
-            if imported == FRONT_DOOR:
-                wrong.append(f"{name} imports {FRONT_DOOR}, which imports everything: name the module")
+            if imported in FRONT_DOORS:
+                wrong.append(f"{name} imports through {imported}, which opens on everything: name the module")
                 continue
             to_floor, to_room = place(imported)
             if not (to_floor > floor or to_room == room):
@@ -97,7 +98,7 @@ def test_folders_do_not_import_each_other_in_a_circle():
     folders = {module_name(path): folder_of(path) for path in MODULES}
     below: dict[str, set[str]] = {folder: set() for folder in folders.values()}
     for path in MODULES:
-        if module_name(path) != FRONT_DOOR:
+        if module_name(path) not in FRONT_DOORS:
             below[folder_of(path)] |= {folders[name] for name in imports(path) if name in folders} - {folder_of(path)}
     while bottom := {folder for folder, others in below.items() if not others}:
         below = {folder: others - bottom for folder, others in below.items() if folder not in bottom}

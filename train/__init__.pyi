@@ -1,0 +1,11 @@
+from train.learning.checkpoint import Checkpoint as Checkpoint
+from train.learning.checkpoint import load_checkpoint as load_checkpoint
+from train.learning.checkpoint import save_checkpoint as save_checkpoint
+from train.learning.curve import Point as Point
+from train.learning.curve import load_curve as load_curve
+from train.learning.learner import Learner as Learner
+from train.learning.policy import deterministic_policy as deterministic_policy
+from train.ppo import train as train
+from train.settings.config import Config as Config
+from train.settings.config import compose as compose
+from train.settings.options import Ppo as Ppo
