@@ -25,7 +25,7 @@ def example():
 
 @pytest.mark.slow
 def test_the_return_rises_within_a_short_budget(env, example):
-    import torch
+    import torch  # pyright: ignore[reportMissingImports]  no dependency of the project
 
     vector = TrackingVectorEnv(env, WORLDS, autoreset_mode="SameStep")
     torch.manual_seed(0)
