@@ -43,7 +43,7 @@ def test_they_step_reset_and_count_in_a_compiled_scan(env, wrapped, reset):
 
 
 def test_typed_keys_are_given_as_their_raw_data(wrapped, reset):
-    """Brax's EpisodeWrapper takes a key's last axis for its words: of typed keys, its counters lack the worlds' axis."""
+    """Brax's EpisodeWrapper takes a key's last axis for its words: of typed keys its counters lack the worlds' axis."""
     typed = jax.random.split(jax.random.key(3), WORLDS)
     raw, state = reset(jax.random.key_data(typed)), reset(typed)
     np.testing.assert_array_equal(state.obs, raw.obs)
