@@ -7,6 +7,8 @@
 short and not tuned; `mjx-hand train` is the project's own.
 """
 
+# PyTorch is no dependency of the project.
+# pyright: reportMissingImports=false
 import numpy as np
 import torch
 import tyro

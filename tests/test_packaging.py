@@ -77,7 +77,9 @@ def test_command_builds_a_hand_from_another_folder(installed, tmp_path):
     assert (tmp_path / "hand" / "right_hand.urdf").is_file()
 
 
-def test_training_entry_point_finds_its_configurations(installed, tmp_path):
-    shown = run([installed / "python", "-m", "train.ppo", "--cfg", "job", "config=pinch_demo"], tmp_path)
+@pytest.mark.parametrize("command", [("python", "-m", "train.ppo"), ("mjx-hand", "train")])
+def test_training_entry_point_finds_its_configurations(installed, tmp_path, command):
+    program, *arguments = command
+    shown = run([installed / program, *arguments, "--cfg", "job", "config=pinch_demo"], tmp_path)
     assert "name: pinch_demo\n" in shown
     assert list(tmp_path.iterdir()) == []
