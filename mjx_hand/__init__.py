@@ -22,7 +22,7 @@ from mjx_hand.retarget.sequence import retarget_sequence
 from mjx_hand.rigid.build import build_rigid_hand
 from mjx_hand.rigid.rigid_hand import joint_rotations
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "InputError",
