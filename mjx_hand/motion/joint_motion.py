@@ -46,6 +46,7 @@ class JointMotion:
 
     @property
     def num_frames(self) -> int:
+        """How many frames there are, gaps included."""
         return self.angles.shape[0]
 
 

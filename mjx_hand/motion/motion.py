@@ -55,6 +55,7 @@ class Motion:
 
     @property
     def num_frames(self) -> int:
+        """How many frames there are, gaps included."""
         return self.rotations.shape[0]
 
 

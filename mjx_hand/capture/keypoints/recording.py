@@ -35,6 +35,7 @@ class KeypointRecording:
 
     @property
     def num_frames(self) -> int:
+        """How many frames there are, gaps included."""
         return self.positions.shape[0]
 
 

@@ -33,6 +33,7 @@ class MarkerRecording:
 
     @property
     def num_frames(self) -> int:
+        """How many frames there are, gaps included."""
         return self.positions.shape[0]
 
 
