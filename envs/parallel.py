@@ -61,7 +61,7 @@ class ParallelEnv(Env):
         return jax.vmap(self._reset)(rng)
 
     def step(self, state: State, action: Float[Array, "n 26"]) -> State:
-        """One control step of every world, as `TrackingEnv.step`; an episode that has ended is followed by a new one."""
+        """One control step of every world, as `TrackingEnv.step`; a new episode follows one that has ended."""
         return jax.vmap(self._step)(state, action)
 
     def _reset(self, rng: Array) -> State:

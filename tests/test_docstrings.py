@@ -63,7 +63,8 @@ def test_a_public_name_and_its_methods_have_docstrings(name: str):
     value = PUBLIC[name]
     # A dataclass without a docstring gets its signature for one.
     bare = inspect.isclass(value) and (value.__doc__ or "").startswith(f"{value.__name__}(")
-    assert value.__doc__ and not bare
+    assert value.__doc__
+    assert not bare
     if inspect.isclass(value):
         lacking = [member for member, defined in methods(name, value) if not defined.__doc__]
         assert not lacking
