@@ -18,7 +18,7 @@ class MarkerRecording:
     """Labelled markers over time; metres, in the capture system's frame.
 
     Attributes:
-        fps: frames a second.
+        fps: frames per second.
         positions: marker centres; zero where a marker is not visible, never NaN.
         visible: whether the marker was seen in the frame.
         names: the markers' labels.
