@@ -39,14 +39,17 @@ class ParallelEnv(Env):
 
     @property
     def action_size(self) -> int:
+        """As `TrackingEnv.action_size`."""
         return self.env.action_size
 
     @property
     def observation_size(self) -> int:
+        """As `TrackingEnv.observation_size`."""
         return self.env.observation_size
 
     @property
     def backend(self) -> str:
+        """As `TrackingEnv.backend`."""
         return self.env.backend
 
     def with_tables(self, tables: Tables) -> "ParallelEnv":
@@ -58,6 +61,7 @@ class ParallelEnv(Env):
         return jax.vmap(self._reset)(rng)
 
     def step(self, state: State, action: Float[Array, "n 26"]) -> State:
+        """One control step of every world, as `TrackingEnv.step`; a new episode follows one that has ended."""
         return jax.vmap(self._step)(state, action)
 
     def _reset(self, rng: Array) -> State:

@@ -127,10 +127,12 @@ class TrackingEnv(Env):
 
     @property
     def reference(self) -> Reference:
+        """What the twins are told to follow, and where the objects are to be."""
         return self.tables.reference
 
     @property
     def num_demonstrations(self) -> int:
+        """How many demonstrations there are to track."""
         return len(self.models)
 
     @property
@@ -140,14 +142,17 @@ class TrackingEnv(Env):
 
     @property
     def action_size(self) -> int:
+        """How many numbers an action has: the residuals of six wrist joints and 20 hinges."""
         return NUM_WRIST + NUM_HINGES
 
     @property
     def observation_size(self) -> int:
+        """How many numbers an observation has."""
         return jax.eval_shape(self.reset, jax.random.key(0)).obs.shape[-1]
 
     @property
     def backend(self) -> str:
+        """The physics engine's name."""
         return self.engine.name
 
     def reset(self, rng: Array) -> State:

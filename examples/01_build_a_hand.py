@@ -23,14 +23,14 @@ def main() -> None:
     """Compare two people's hands and write the second."""
     hand = mjx_hand.load_hand()  # the open hand; load_hand("MANO_RIGHT.pkl") for a licensed one
     flat = np.zeros(20)  # hinge angles, rad
-    for name, shape in {"mean": None, "mine": [1.0, -0.5]}.items():
-        rigid = mjx_hand.build_rigid_hand(hand, shape)
+    mean, mine = (mjx_hand.build_rigid_hand(hand, shape) for shape in (None, [1.0, -0.5]))
+    for name, rigid in {"mean": mean, "mine": mine}.items():
         reach = np.linalg.norm(np.asarray(finger_tips(flat, rigid)), axis=1)
         print(f"{name}: {1e3 * rigid.link_mass.sum():.0f} g, wrist to middle finger tip {1e3 * reach[1]:.1f} mm")
 
     with filling(OUT) as folder:  # all files or none
-        write_urdf(rigid, folder)
-        write_mjcf(rigid, folder, base="fixed")
+        write_urdf(mine, folder)
+        write_mjcf(mine, folder, base="fixed")
 
     model = mujoco.MjModel.from_xml_path(str(OUT / "right_hand.xml"))
     data = mujoco.MjData(model)

@@ -12,6 +12,6 @@ lists the public names.
 
 from mjx_hand.lazy_exports import lazy_exports
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)  # type: ignore[assignment]  # the stub's names

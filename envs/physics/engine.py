@@ -63,7 +63,9 @@ class Engine(Protocol):
         ...
 
     @property
-    def models(self) -> Sequence[mujoco.MjModel]: ...
+    def models(self) -> Sequence[mujoco.MjModel]:
+        """One compiled scene per variant."""
+        ...
 
     def reset(
         self,

@@ -36,7 +36,7 @@ def load_motion(
         side: "right" or "left", where both hands are recorded.
         sequence: the name of one recording, where there are several.
         mano: a licensed MANO file of that side, where the poses need its components or mean.
-        fps: frames a second, where the recording does not say.
+        fps: frames per second, where the recording does not say.
         markers: the marker set of a marker recording: a YAML file, or "hand22" or "glove13".
 
     Raises:
@@ -83,7 +83,7 @@ def _asked_for(path: Path, known: DatasetFormat, request: Request, motion: Motio
     if request.side not in (None, motion.side):
         raise InputError(f"{path}: holds a {motion.side} hand; leave out side={request.side!r}")
     if request.fps not in (None, motion.fps):
-        raise InputError(f"{path}: was recorded at {motion.fps:g} frames a second; leave out fps={request.fps:g}")
+        raise InputError(f"{path}: was recorded at {motion.fps:g} frames per second; leave out fps={request.fps:g}")
     return motion
 
 

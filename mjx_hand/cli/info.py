@@ -25,7 +25,7 @@ def info(
         side: which hand to describe, where there are both.
         sequence: which recording to describe, where there are several.
         mano: a licensed MANO file, for datasets whose poses need one.
-        fps: frames a second, where the recording does not say.
+        fps: frames per second, where the recording does not say.
         units: m, cm, mm or in, where a marker file's own unit is wrong or missing.
     """
     found = file_facts(file, side, sequence, mano, fps, units)

@@ -35,7 +35,7 @@ def keypoints(
         out: the .npz to write: the motion, which `mjx-hand retarget` reads.
         side: which hand, where the file holds both or does not say.
         sequence: the name of one hand in the file, where there are several.
-        fps: frames a second, where the file does not say.
+        fps: frames per second, where the file does not say.
         unit: of the positions, where the file does not say and they are not metres.
         cutoff: of a low-pass filter, Hz; 6 is usual for hands. Without it, the recording's noise stays.
         own_bones: keep the recorded joint centres and finger tips beside the shape.

@@ -63,7 +63,7 @@ def retarget(
         mano: a licensed MANO file, for recordings made with one; without it, the open hand.
         side: right or left, where both hands are recorded.
         sequence: the name of one recording, where a file has several.
-        fps: frames a second, where the recording does not say.
+        fps: frames per second, where the recording does not say.
     """
     options = RetargetOptions(method=method, carry=carry, limits=limits, refine=refine, smooth=smooth)
     if pattern is not None or (recording.is_dir() and not any(f.recognises(recording, {}) for f in dataset_formats())):

@@ -44,7 +44,7 @@ def robot(
             position (links where the keypoints are, with a base that moves).
         side: which hand, where the recording holds both or does not say.
         sequence: the name of one hand or recording in the file, where there are several.
-        fps: frames a second, where the recording does not say.
+        fps: frames per second, where the recording does not say.
     """
     check_out(out, recording)
     description = load_robot(robot)

@@ -47,7 +47,7 @@ def view(
         units: m, cm, mm or in, where the marker file's own unit is wrong or missing.
         side: which hand, where the file holds both or does not say.
         sequence: the name of one recording in the file, where there are several.
-        fps: frames a second, where the file does not say.
+        fps: frames per second, where the file does not say.
         up: the recording's upward axis: +y for Leap and XR devices, -y for most cameras.
         mano: a licensed MANO file, for recordings made with one; without it, the open hand.
         port: to serve at; 0 chooses a free one.

@@ -46,7 +46,7 @@ def numbers(
         sizes |= {d: n for d, n in zip(wanted, value.shape, strict=True) if isinstance(d, str)}
         if finite and not np.isfinite(value).all():
             where = tuple(int(i) for i in np.argwhere(~np.isfinite(value))[0])
-            raise InputError(f"{path}: {name} has NaN or infinity, first at {where}; mend or leave out those frames")
+            raise InputError(f"{path}: {name} has NaN or infinity, first at {where}; repair or leave out those frames")
         found[name] = value
     return found
 

@@ -44,8 +44,10 @@ class HandModel:
 
     @property
     def num_vertices(self) -> int:
+        """How many vertices the skin has."""
         return self.template.shape[0]
 
     @property
     def num_shape(self) -> int:
+        """How many shape coefficients the hand takes."""
         return self.shapedirs.shape[-1]

@@ -56,6 +56,7 @@ class Demonstration:
 
     @property
     def num_frames(self) -> int:
+        """How many frames there are."""
         return self.object_pose.shape[0]
 
 

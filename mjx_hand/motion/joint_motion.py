@@ -27,7 +27,7 @@ class JointMotion:
     """Hinge angles over time; radians, metres, quaternions wxyz.
 
     Attributes:
-        fps: frames a second.
+        fps: frames per second.
         angles: hinge angles in the order of `hand.joints.HINGES`.
         wrist_position: the wrist joint in the recording's world frame.
         wrist_quaternion: world from hand frame, wxyz.
@@ -46,6 +46,7 @@ class JointMotion:
 
     @property
     def num_frames(self) -> int:
+        """How many frames there are, gaps included."""
         return self.angles.shape[0]
 
 
@@ -89,7 +90,7 @@ def joint_motion_of(path: str | Path, arrays: Mapping[str, np.ndarray], source: 
     fps, side = float(n["fps"]), text(path, arrays, "side")
     if len(n["angles"]) == 0 or fps <= 0 or side not in ("right", "left"):
         raise InputError(
-            f"{path}: {len(n['angles'])} frames at {fps} frames a second of a {side!r} hand; "
+            f"{path}: {len(n['angles'])} frames at {fps} frames per second of a {side!r} hand; "
             "expected at least one frame, a positive rate, and 'right' or 'left'"
         )
     return JointMotion(

@@ -29,7 +29,7 @@ class Motion:
     """A pose sequence; metres, seconds, quaternions wxyz.
 
     Attributes:
-        fps: frames a second.
+        fps: frames per second.
         rotations: the 15 MANO joints' rotations relative to their parents, about the flat hand. Frames that
             are not valid hold the identity, never NaN.
         wrist_position: the wrist joint in the world (or camera) frame of the recording.
@@ -55,6 +55,7 @@ class Motion:
 
     @property
     def num_frames(self) -> int:
+        """How many frames there are, gaps included."""
         return self.rotations.shape[0]
 
 

@@ -47,7 +47,7 @@ def matrix_quaternions(matrices: Float[Array, "t 3 3"]) -> Float[Array, "t 4"]:
 
 
 def resample_motion(motion: Motion, fps: float) -> Motion:
-    """The motion sampled at `fps` frames a second, from its first frame's time to no later than its last's.
+    """The motion sampled at `fps` frames per second, from its first frame's time to no later than its last's.
 
     A new frame is valid where both frames around it are; the others hold the identity and an interpolated wrist.
 
@@ -55,7 +55,7 @@ def resample_motion(motion: Motion, fps: float) -> Motion:
         InputError: `fps` is not a positive number, or no frame is valid.
     """
     if not np.isfinite(fps) or fps <= 0:
-        raise InputError(f"fps is {fps}, expected a positive number of frames a second")
+        raise InputError(f"fps is {fps}, expected a positive number of frames per second")
     good = np.flatnonzero(motion.valid)
     if good.size == 0:
         raise InputError(f"{motion.source or 'motion'}: all {motion.num_frames} frames are gaps; nothing to resample")

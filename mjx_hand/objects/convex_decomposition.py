@@ -34,7 +34,7 @@ def convex_pieces(
     """
     vertices, faces = np.asarray(vertices, float), np.asarray(faces)
     if not np.isfinite(vertices).all():
-        raise InputError("the mesh has NaN or infinite vertices; mend it first")
+        raise InputError("the mesh has NaN or infinite vertices; repair it first")
     if len(faces) == 0 or faces.min() < 0 or faces.max() >= len(vertices):
         raise InputError(f"the mesh has {len(faces)} faces over {len(vertices)} vertices that do not fit together")
     if np.linalg.matrix_rank(vertices - vertices.mean(axis=0), tol=1e-6) < 3:

@@ -8,7 +8,7 @@ from jaxtyping import Array, Float, Int
 from mjx_hand.errors import InputError
 
 _ON_SURFACE = 1e-7  # m; nearer than this the direction is the triangle's own normal
-_POINTS = 64  # points a call; each is compared with every triangle
+_POINTS = 64  # points per call; each is compared with every triangle
 
 
 def signed_distance(

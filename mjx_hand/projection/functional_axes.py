@@ -48,7 +48,7 @@ def fit_functional_axes(
     For each joint, minimises the mean squared error of the exact projection (the chord 2 sin(ψ/2) of its angle ψ) over
     the frames, and keeps near `rigid`'s axes what the motion does not show: a joint that hardly moves keeps its
     axes. Frames far off count little. Angles are eliminated by the projection's closed form; what is left is four or
-    five numbers a joint, solved by Levenberg and Marquardt's method for all joints at once.
+    five numbers per joint, solved by Levenberg and Marquardt's method for all joints at once.
 
     Order and signs stay: the first hinge of a base joint stays within 44 degrees of `rigid`'s first and the second of
     its second, a single hinge within 80; angles count from the flat hand. So limits, names and policies carry over.

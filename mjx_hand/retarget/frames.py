@@ -19,8 +19,8 @@ from mjx_hand.retarget.refine import recorded_places, refine_angles
 from mjx_hand.rigid.rigid_hand import RigidHand, chain, joint_rotations, stack_hands, tip_positions
 from mjx_hand.rotations import geodesic_angle
 
-CHUNK = 8192  # frames a call, about; 5 MB of rotations
-HANDS = 64  # different hands a call, at most
+CHUNK = 8192  # frames per call, about; 5 MB of rotations
+HANDS = 64  # different hands per call, at most
 
 
 @partial(jax.jit, static_argnames=("method", "carry", "limits", "refine"))

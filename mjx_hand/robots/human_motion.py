@@ -87,7 +87,7 @@ def human_motion(
 
     Args:
         keypoints: m, in any frame that stands still; NaN where one is missing.
-        fps: frames a second.
+        fps: frames per second.
         rigid: the hand, of the person's size; see `sized_hand`.
         smoothness: see `objectives`.
         source: provenance.

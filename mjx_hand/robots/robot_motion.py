@@ -24,7 +24,7 @@ class RobotMotion:
     """A robot hand over time; radians (metres for sliding joints), quaternions wxyz.
 
     Attributes:
-        fps: frames a second.
+        fps: frames per second.
         values: every joint's value, tied (mimic) joints included.
         base_position, base_quaternion: the URDF's root link in the recording's frame; zero and the identity where the
             hand was retargeted without its base.
@@ -66,7 +66,7 @@ def load_robot_motion(path: str | Path) -> RobotMotion:
     layout = {"fps": (), "angles": ("t", len(names)), "base_position": ("t", 3), "base_quaternion": ("t", 4)}
     n = numbers(path, arrays, {**layout, "valid": ("t",)})
     if not names or n["fps"] <= 0:
-        raise InputError(f"{path}: {len(names)} joints at {float(n['fps'])} frames a second; make it again")
+        raise InputError(f"{path}: {len(names)} joints at {float(n['fps'])} frames per second; make it again")
     return RobotMotion(
         fps=float(n["fps"]),
         values=n["angles"].astype(float),

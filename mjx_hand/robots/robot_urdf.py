@@ -203,5 +203,5 @@ def _limits(
         lower[k], upper[k] = max(lower[k], ends[0]), min(upper[k], ends[1])
     for name, low, high in zip(leaders, lower, upper, strict=True):
         if low > high + 1e-6:
-            raise InputError(f"{path}: the limits of {name!r} and its mimic joints exclude each other; mend the limits")
+            raise InputError(f"{path}: the limits of {name!r} and its mimic joints exclude each other; fix the limits")
     return lower.astype(np.float32), np.maximum(upper, lower).astype(np.float32)

@@ -20,7 +20,7 @@ class Request:
         sequence: the name of one recording, where a file or folder has several.
         mano: a licensed MANO file of that side, where poses are PCA coefficients or relative to MANO's mean pose, and
             for the wrist joint's own place.
-        fps: frames a second, where the recording does not say.
+        fps: frames per second, where the recording does not say.
     """
 
     side: str | None = None

@@ -10,7 +10,7 @@ its dictionary (`{hands: [...], trajectory_metadata: {hand_names, mano_hand_shap
 - `mano_joint_pos` (T, 21, 3) or (T, 63): joints before the global motion, wrist first, then thumb to little finger.
 - `urdf_dof` (T, 26): the angles of the dataset's own robot hand; not read.
 
-The dataset card names the fields and the capture rate, 100 frames a second; a row's `data_fps` says otherwise where
+The dataset card names the fields and the capture rate, 100 frames per second; a row's `data_fps` says otherwise where
 there is one. Conventions are those of a public viewer of the dataset: it makes the hand with `flat_hand_mean=True` from
 all 48 values and then turns it *about the hand model's origin*, so the wrist is at `mano_global_pos` plus the turned
 place of the resting wrist. That place is `mano_joint_pos`'s first joint; without these joints, the licensed file's or

@@ -10,7 +10,7 @@ Layout: https://github.com/NVlabs/dex-ycb-toolkit (README.md, sequence_loader.py
 
 The hand is made with `flat_hand_mean=False` and 45 components, so the licensed file is needed; the translation is added
 to a hand that was turned about its wrist joint. Poses are in the master camera's frame; here they are brought to the
-table's, that of the AprilTag on it (z up), as the dataset's own viewer does to find the table. 30 frames a second.
+table's, that of the AprilTag on it (z up), as the dataset's own viewer does to find the table. 30 frames per second.
 """
 
 from pathlib import Path

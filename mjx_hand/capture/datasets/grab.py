@@ -1,6 +1,6 @@
 """GRAB (Taheri et al., ECCV 2020, https://grab.is.tue.mpg.de): `grab/SUBJECT/SEQUENCE.npz`.
 
-Layout: https://github.com/otaheri/GRAB (README.md, grab/grab_preprocessing.py). `framerate` (120 frames a second), and
+Layout: https://github.com/otaheri/GRAB (README.md, grab/grab_preprocessing.py). `framerate` (120 frames/s), and
 pickled dictionaries `rhand` and `lhand`, each with:
 
 - `params`: `global_orient` (T, 3) and `fullpose` (T, 45), axis-angles (rad) about the flat hand; `hand_pose` (T, n),

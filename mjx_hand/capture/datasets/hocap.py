@@ -10,7 +10,7 @@ Layout: https://github.com/IRVLUTD/HO-Cap (hocap/loaders/sequence_loader.py, hoc
 The toolkit makes the hand with `flat_hand_mean=True` and 45 components: the licensed file is needed for its components,
 and no mean is added. That could not be checked on a recording. It names `center_idx=0`, which its library (manopth)
 ignores where there is a translation, so the wrist is at the translation plus its place at rest. Poses are in the
-table's frame, that of `tag_1`. 30 frames a second. `poses_o.npy`, the objects, is not read.
+table's frame, that of `tag_1`. 30 frames per second. `poses_o.npy`, the objects, is not read.
 """
 
 from pathlib import Path

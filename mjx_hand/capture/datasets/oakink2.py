@@ -5,7 +5,7 @@ pickled dictionary with PyTorch tensors, read without PyTorch:
 
 - `raw_mano`: of each capture frame, by its number, `{rh,lh}__pose_coeffs` (1, 16, 4), quaternions wxyz of the wrist and
   MANO's 15 joints about the flat hand; `{rh,lh}__tsl` (1, 3), metres; `{rh,lh}__betas` (1, 10).
-- `mocap_frame_id_list`: the numbers, which count 120 frames a second. Numbers left out are gaps.
+- `mocap_frame_id_list`: the numbers, which count 120 frames per second. Numbers left out are gaps.
 
 The hand is made with its wrist joint at the origin (`center_idx=0`) and then moved: `tsl` is the wrist joint. Poses are
 in the world frame of the capture system; `cam_extr`, objects and the body are not read. No licensed file is needed for

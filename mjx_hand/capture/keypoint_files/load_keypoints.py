@@ -26,7 +26,7 @@ def load_keypoints(
         path: the file.
         side: "right" or "left", where the file holds both hands or does not say which it holds.
         sequence: the name of one hand in the file, where there are several.
-        fps: frames a second, where the file does not say.
+        fps: frames per second, where the file does not say.
         unit: "m", "cm" or "mm", where the file does not say.
 
     Raises:
@@ -43,7 +43,7 @@ def load_keypoints(
         raise InputError(f"{path}: no keypoint file that is known here; read are {known}")
     recording = chosen(path, reader.read(path, contents, unit), side, sequence)
     if recording.fps is not None and fps not in (None, recording.fps):
-        raise InputError(f"{path}: was recorded at {recording.fps:g} frames a second; leave out fps={fps:g}")
+        raise InputError(f"{path}: was recorded at {recording.fps:g} frames per second; leave out fps={fps:g}")
     return replace(recording, fps=recording.fps or fps)
 
 

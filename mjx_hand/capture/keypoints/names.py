@@ -46,7 +46,7 @@ def named_keypoints(
         InputError: the names are not one a point, are not, or not all, of a layout, or two of them are one joint.
     """
     if len(names) != points.shape[-2]:
-        raise InputError(f"{path}: has {points.shape[-2]} points a hand and {len(names)} names; give one name a point")
+        raise InputError(f"{path}: has {points.shape[-2]} points per hand and {len(names)} names; give one per point")
     layout = layout_named(names)
     given = [plain(name) for name in names]
     if layout is None:
@@ -79,5 +79,5 @@ def counted_keypoints(
     known = LAYOUTS[layout] if layout is not None else _COUNTS.get(count)
     if known is None or len(known.joints) != count:
         counts = ", ".join(f"{name} {len(each.joints)}" for name, each in LAYOUTS.items())
-        raise InputError(f"{path}: has {count} points a hand; known layouts: {counts}")
+        raise InputError(f"{path}: has {count} points per hand; known layouts: {counts}")
     return to_keypoints(points, known), known.name

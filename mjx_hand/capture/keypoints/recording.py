@@ -20,7 +20,7 @@ class KeypointRecording:
     """One hand's keypoints over time; metres, in the recording's frame.
 
     Attributes:
-        fps: frames a second; None where nobody has said.
+        fps: frames per second; None where nobody has said.
         positions: the 21 keypoints in the order of `layouts.KEYPOINTS`; NaN where one is missing.
         side: "right", "left", or "" where the recording does not say.
         layout: name of the device's layout in `layouts.LAYOUTS`.
@@ -35,6 +35,7 @@ class KeypointRecording:
 
     @property
     def num_frames(self) -> int:
+        """How many frames there are, gaps included."""
         return self.positions.shape[0]
 
 

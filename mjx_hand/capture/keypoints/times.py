@@ -13,7 +13,7 @@ DROPPED = 1.5  # frames: a longer step is a gap
 
 
 def stated_rate(path: object, name: str, value: object) -> float:
-    """The frames a second that a file says, as a number or as text.
+    """The frames per second that a file says, as a number or as text.
 
     Raises:
         InputError: it is no number.
@@ -23,7 +23,7 @@ def stated_rate(path: object, name: str, value: object) -> float:
             return float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         pass
-    raise InputError(f"{path}: {name} is {value!r}, expected frames a second, such as 30")
+    raise InputError(f"{path}: {name} is {value!r}, expected frames per second, such as 30")
 
 
 def in_seconds(times: Float[Array, "t"]) -> Float[Array, "t"]:

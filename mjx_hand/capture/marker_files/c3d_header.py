@@ -8,7 +8,8 @@ from mjx_hand.capture.marker_files.c3d_parameters import BLOCK, PROCESSORS, Numb
 from mjx_hand.errors import InputError
 
 LONG = 0xFFFF  # the last frame that the header can name; longer recordings say theirs in a parameter
-_WORDS = "HHHHHfHH"  # points, analog values a frame, first, last frame, gap, scale, data's block, analog a point frame
+# Points, analog values per frame, first and last frame, gap, scale, block of the data, analog samples per point frame.
+_WORDS = "HHHHHfHH"
 
 
 @dataclass(frozen=True)

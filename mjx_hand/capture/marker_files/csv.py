@@ -5,7 +5,7 @@
     time,index_tip_x,index_tip_y,index_tip_z,...
     0.000,110.4,135.1,460.6,...
 
-Lines that start with `#` say the unit (m, cm, mm, in) and the frames a second. Without a rate, a column `time`, `t`
+Lines that start with `#` say the unit (m, cm, mm, in) and the frames per second. Without a rate, a column `time`, `t`
 or `timestamp` in seconds gives it. A column `frame` is passed over, others are refused. Gaps are empty, `nan` or zero.
 """
 

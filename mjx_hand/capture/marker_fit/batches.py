@@ -11,7 +11,7 @@ from mjx_hand.capture.marker_fit.pose_solver import Frames, PoseEstimate, solve_
 from mjx_hand.capture.marker_fit.skinned_points import SkinnedPoints
 from mjx_hand.pytree import replace
 
-CHUNK = 256  # frames a call
+CHUNK = 256  # frames per call
 BY_FRAME = ("observed", "weight", "rest", "centres", "mean")  # what of `Frames` has a row a frame
 Array = np.ndarray
 

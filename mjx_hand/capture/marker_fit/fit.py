@@ -91,7 +91,7 @@ def fit_many(
 ) -> list[tuple[Motion, FitReport]]:
     """The motions of `hand` that explain recordings, each of a subject of its own, in one batch.
 
-    Four stages: poses of up to 48 frames a recording on the mean shape; the recording's shape and skin offsets
+    Four stages: poses of up to 48 frames per recording on the mean shape; the recording's shape and skin offsets
     together with these poses; all frames' poses from there; the same again, drawn towards the frames around each.
 
     Args:

@@ -18,7 +18,7 @@ class MarkerRecording:
     """Labelled markers over time; metres, in the capture system's frame.
 
     Attributes:
-        fps: frames a second.
+        fps: frames per second.
         positions: marker centres; zero where a marker is not visible, never NaN.
         visible: whether the marker was seen in the frame.
         names: the markers' labels.
@@ -33,6 +33,7 @@ class MarkerRecording:
 
     @property
     def num_frames(self) -> int:
+        """How many frames there are, gaps included."""
         return self.positions.shape[0]
 
 

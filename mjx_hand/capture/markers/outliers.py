@@ -22,7 +22,7 @@ def excursions(
     Args:
         positions: of the markers (m), anything where one is not visible.
         visible: whether it was seen.
-        fps: frames a second.
+        fps: frames per second.
         leap: the least leap, m.
     """
     away = np.zeros(visible.shape, bool)

@@ -27,7 +27,7 @@ def add_off_axis_rotation(
         rotations: relative rotations of the 15 joints.
         seed: of the random course.
         scale: 1 for the size of real recordings, 0 for none.
-        fps: frames a second.
+        fps: frames per second.
 
     Raises:
         InputError: scale or fps is out of range.
@@ -56,7 +56,7 @@ def minor_directions(
 
 
 def smooth_course(rng: np.random.Generator, frames: int, fps: float) -> Float[Array, "t 15 2"]:
-    """Two smooth random courses a joint: cubic splines through independent normal values."""
+    """Two smooth random courses per joint: cubic splines through independent normal values."""
     times = np.arange(frames) / fps
     knots = np.arange(0.0, times[-1] + 2 * KNOT_INTERVAL, KNOT_INTERVAL)
     return CubicSpline(knots, rng.normal(size=(len(knots), NUM_BALL_JOINTS, 2)))(times)

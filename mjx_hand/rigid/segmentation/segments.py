@@ -98,7 +98,7 @@ def cut(hand: HandModel) -> Cut:
             pole = outward[joint] / np.linalg.norm(outward[joint]) * (-1 if joint == link else 1)
             cap = dome(divided[outline], centres[joint], pole, template, closed)
             if (cap.inward >= 1).any():
-                raise InputError(f"{hand.name}: the joint of {LINKS[joint]} lies outside the skin; mend the regressor")
+                raise InputError(f"{hand.name}: the joint of {LINKS[joint]} lies outside the skin; fix the regressor")
             domes.append((np.searchsorted(shell.vertex_ids, outline), joint, cap))
         segments.append(Segment(close(faces, links), shell, tuple(domes)))
     return Cut(skin, tuple(segments))

@@ -11,7 +11,7 @@ class Playback:
 
     Attributes:
         frames: of the recording.
-        fps: frames a second.
+        fps: frames per second.
         began: when it began (s, any clock).
         start: the frame that it began with.
         speed: times real time.

@@ -105,7 +105,7 @@ class Scene:
 
     Attributes:
         title: one line.
-        fps: frames a second.
+        fps: frames per second.
         layers: what is drawn.
         curves: what is plotted below.
         up: the world's upward axis.

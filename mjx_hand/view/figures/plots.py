@@ -98,7 +98,7 @@ def error_over_time(
     """Errors over the demonstration's time: each method's median, with bands of 50 % and 80 % of its rollouts.
 
     Args:
-        fps: frames a second.
+        fps: frames per second.
         errors: method name to its errors and the mask of frames that count; frames of no rollout are not drawn.
         label: of the vertical axis.
         limit: a threshold to draw as a level.

@@ -100,7 +100,7 @@ def write_video(path: str | Path, frames: Iterable[Frame], fps: float) -> None:
     if Path(path).suffix != ".mp4":
         raise InputError(f"{path}: videos are MP4; give a name that ends in .mp4")
     if not np.isfinite(fps) or fps <= 0:
-        raise InputError(f"fps is {fps}; give a positive number of frames a second")
+        raise InputError(f"fps is {fps}; give a positive number of frames per second")
     frames = iter(frames)
     first = next(frames, None)
     if first is None:

@@ -91,7 +91,7 @@ def test_frames_that_are_not_finite_are_gaps(tmp_path):
         ({"right": {"pose": np.full((6, 45), np.nan)}}, {}, "in none of its 6 frames"),
         ({"right": {"shape": np.zeros(11)}}, {}, r"shape has shape \(11,\), expected \(10\)"),
         ({"right": {"trans": "far"}}, {}, "cannot read 'right trans'"),
-        ({"right": {}}, {"fps": 25.0}, "recorded at 30 frames a second; leave out fps=25"),
+        ({"right": {}}, {"fps": 25.0}, "recorded at 30 frames per second; leave out fps=25"),
         ({"right": {}}, {"sequence": "a"}, "holds one recording; leave out sequence='a'"),
     ],
 )

@@ -109,7 +109,7 @@ def test_links_and_keypoints_name_the_same_joints():
     [
         ([*KEYPOINTS[:20], "nose"], "lacks little_tip"),
         ([f"p{k}" for k in range(21)], "no hand's joints"),
-        (list(KEYPOINTS[:20]), "has 21 points a hand and 20 names"),
+        (list(KEYPOINTS[:20]), "has 21 points per hand and 20 names"),
         ([*KEYPOINTS, "WRIST"], "twice"),
     ],
 )
@@ -121,7 +121,7 @@ def test_wrong_names_are_refused_in_one_line(names, says):
 
 
 def test_wrong_number_of_points_is_refused():
-    with pytest.raises(InputError, match="has 18 points a hand"):
+    with pytest.raises(InputError, match="has 18 points per hand"):
         counted_keypoints("hand.npz", some_points(0, 18))
     with pytest.raises(InputError, match="layout is 'kinect'"):
         counted_keypoints("hand.npz", some_points(0, 21), "kinect")
