@@ -166,7 +166,7 @@ def _stacked_planes(hulls: Sequence[Float[np.ndarray, "_ _ 3"]]) -> Float[np.nda
 
 def _check(demonstrations: Sequence[Demonstration]) -> None:
     if not demonstrations:
-        raise InputError("no demonstrations given; make a set with envs.demonstrations.dataset.make_set")
+        raise InputError("no demonstrations given; make a set with envs.make_set")
     for what, values in (
         ("frame rates", {round(d.motion.fps, 6) for d in demonstrations}),
         ("sides", {d.motion.side for d in demonstrations}),

@@ -83,6 +83,11 @@ class TrackingEnv(Env):
         task: rewards, residual ranges, resets.
         gains: of the hand's position controllers.
 
+    Attributes:
+        demonstrations, hands: what it was built over.
+        models: MuJoCo's of each demonstration's scene.
+        tables: what it looks up; `with_tables` puts another set's in their place.
+
     Raises:
         InputError: demonstrations that do not fit together, a rate the task cannot keep, or an unknown engine.
     """
@@ -95,6 +100,7 @@ class TrackingEnv(Env):
         task: Task | None = None,
         gains: Gains | None = None,
     ):
+        self.demonstrations, self.hands = tuple(demonstrations), tuple(hands)
         self.task = Task() if task is None else task
         gains = Gains() if gains is None else gains
         reference = _cached_reference(demonstrations, hands, self.task.grip_force, gains)

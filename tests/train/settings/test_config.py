@@ -10,7 +10,7 @@ from mjx_hand.errors import InputError
 from train.settings.config import Config, compose, compose_seeds
 
 ROOT = Path(__file__).resolve().parent.parent.parent.parent
-EXPERIMENTS = sorted(path.stem for path in (ROOT / "configs" / "config").glob("*.yaml"))
+EXPERIMENTS = sorted(path.stem for path in (ROOT / "configs" / "config").glob("*.yaml") if path.stem != "given")
 
 
 def refusal(*overrides: str) -> str:
