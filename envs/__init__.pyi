@@ -14,6 +14,7 @@ from envs.parallel import ParallelEnv as ParallelEnv
 from envs.physics import make_engine as make_engine
 from envs.physics.engine import Engine as Engine
 from envs.physics.engine import PhysicsState as PhysicsState
+from envs.rewards import RewardWeights as RewardWeights
 from envs.task import Task as Task
 from envs.tracking import TrackingEnv as TrackingEnv
 from envs.tracking import Twin as Twin

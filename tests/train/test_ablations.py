@@ -15,7 +15,7 @@ from train import ablations, experiments
 from train.ablations import Plan, plan, run
 from train.experiment.evaluate_seeds import POLICY, REPLAY, ZERO
 from train.learning.curve import Point
-from train.learning.run_folder import _plain, _settings, run_folder
+from train.learning.run_folder import _settings, _told, run_folder
 from train.ppo import _write_curve
 from train.reports.ablations_page import Ablation, ablation_table, write_ablations_page
 from train.reports.ablations_variants import UNCHANGED, VARIANTS
@@ -49,7 +49,7 @@ def test_every_variant_changes_what_it_says_and_nothing_else():
     (unchanged,) = planned.variants[0][1]
     for variant, (config,) in planned.variants:
         said = {override.partition("=")[0] for override in variant.overrides}
-        now, before = _settings(_plain(config)), _settings(_plain(unchanged))
+        now, before = _settings(_told(config)), _settings(_told(unchanged))
         assert {name for name in now if now[name] != before[name]} == said, variant.name
         assert bool(said) == (variant.learns and variant != UNCHANGED)
 

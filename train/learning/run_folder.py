@@ -45,6 +45,7 @@ _RENAMED = {
     "task.lost_at_last": "task.termination_distance_last",
     "task.mid_start": "task.random_start_prob",
     "task.ahead": "task.lookahead",
+    "task.action_cost": "task.rewards.action",
 }
 
 

@@ -12,8 +12,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from omegaconf import OmegaConf
 
 import train.ppo
+from envs.rewards import RewardWeights
 from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from tests.train.commands import arguments
@@ -167,9 +169,13 @@ def test_a_folder_from_when_options_had_other_names_is_gone_on_with(tiny: Config
     config = in_folder(tiny, tmp_path)
     run(shortened(config, 32), env)
     written = tmp_path / "config.yaml"
-    text = written.read_text()
-    assert "\n  termination_distance: " in text
-    written.write_text(
-        text.replace("  termination_distance:", "  lost_at:").replace("  residual_scale_fingers:", "  finger:")
-    )
+    settings = OmegaConf.load(written)
+    rewards = settings.task.pop("rewards")
+    settings.task.action_cost = rewards.action
+    settings.task.lost_at = settings.task.pop("termination_distance")
+    settings.task.finger = settings.task.pop("residual_scale_fingers")
+    OmegaConf.save(settings, written)
+    other = dataclasses.replace(config.task, rewards=RewardWeights(action=0.5))
+    with pytest.raises(InputError, match=r"holds a training with task.rewards.action=0.002, now 0.5;"):
+        run(dataclasses.replace(config, task=other), env)
     assert [p.steps for p in run(config, env)] == [0, 32, 64]

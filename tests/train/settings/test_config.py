@@ -58,6 +58,10 @@ def test_what_is_composed_is_frozen_and_hashable():
     [
         ("ppo.num_env=8", "did you mean ppo.num_envs?"),
         ("task.grip_forse=1", "did you mean task.grip_force?"),
+        (
+            "task.rewards.positon=2",
+            "did you mean task.rewards.position?; valid in task.rewards: position, rotation, action",
+        ),
         ("enginee=native", "did you mean engine?"),
         ("data.capture.markr_noise=0", "did you mean data.capture.marker_noise?"),
     ],
