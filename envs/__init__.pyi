@@ -1,4 +1,5 @@
 from envs.demonstrations.dataset import make_set as make_set
+from envs.demonstrations.load_env import load as load
 from envs.demonstrations.set_settings import SetSettings as SetSettings
 from envs.demonstrations.twin_hands import twins as twins
 from envs.evaluation.evaluate import Evaluation as Evaluation
@@ -9,7 +10,6 @@ from envs.evaluation.rollout import Rollouts as Rollouts
 from envs.grasps import grasp_names as grasp_names
 from envs.grasps import grasp_type as grasp_type
 from envs.grasps.grasp_type import GraspType as GraspType
-from envs.load_env import load as load
 from envs.parallel import ParallelEnv as ParallelEnv
 from envs.physics import make_engine as make_engine
 from envs.physics.engine import Engine as Engine

@@ -3,8 +3,8 @@
 import dataclasses
 from pathlib import Path
 
-import envs.load_env
 from envs.demonstrations.dataset import make_set
+from envs.demonstrations.load_env import env_of_set
 from envs.demonstrations.load_set import is_divided
 from envs.demonstrations.set_settings import set_folder
 from envs.evaluation.evaluate import Evaluation, evaluate
@@ -40,7 +40,7 @@ def load_env(config: Config, part: str) -> TrackingEnv:
     """
     if part == "heldout" and config.data.folder and not is_divided(config.data.folder):
         print(f"{config.data.folder} holds no demonstrations out: these are the ones for training", flush=True)
-    return envs.load_env.load_env(config.data, part, config.engine, config.task, config.demonstrations)
+    return env_of_set(config.data, part, config.engine, config.task, config.demonstrations)
 
 
 def without_grip(env: TrackingEnv) -> TrackingEnv:

@@ -22,7 +22,7 @@ def unstable_scene(unstable: Unstable, env: TrackingEnv, name: str) -> Scene:
 
     Args:
         unstable: the step.
-        world: demonstrations that the training had.
+        env: over the demonstrations that the training had.
         name: of the experiment.
 
     Raises:

@@ -39,10 +39,10 @@ def load(
     if bool(grasp) == (folder is not None):
         raise InputError(f"grasp is {grasp!r} and folder {folder}; give one of them")
     settings = SetSettings(grasp) if folder is None else SetSettings(GIVEN, folder=str(folder))
-    return load_env(settings, part, engine, task, root)
+    return env_of_set(settings, part, engine, task, root)
 
 
-def load_env(settings: SetSettings, part: str, engine: str, task: Task | None, root: str | Path) -> TrackingEnv:
+def env_of_set(settings: SetSettings, part: str, engine: str, task: Task | None, root: str | Path) -> TrackingEnv:
     """The environment over one part of any set, as `load`.
 
     Raises:
