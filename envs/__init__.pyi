@@ -1,5 +1,6 @@
-from envs.demonstrations.dataset import SetSettings as SetSettings
 from envs.demonstrations.dataset import make_set as make_set
+from envs.demonstrations.load_env import load as load
+from envs.demonstrations.set_settings import SetSettings as SetSettings
 from envs.demonstrations.twin_hands import twins as twins
 from envs.evaluation.evaluate import Evaluation as Evaluation
 from envs.evaluation.evaluate import evaluate as evaluate
@@ -13,6 +14,7 @@ from envs.parallel import ParallelEnv as ParallelEnv
 from envs.physics import make_engine as make_engine
 from envs.physics.engine import Engine as Engine
 from envs.physics.engine import PhysicsState as PhysicsState
+from envs.rewards import RewardWeights as RewardWeights
 from envs.task import Task as Task
 from envs.tracking import TrackingEnv as TrackingEnv
 from envs.tracking import Twin as Twin

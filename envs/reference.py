@@ -17,7 +17,7 @@ from mjx_hand.objects.description import OBJECT_KINDS, ObjectDescription
 from mjx_hand.objects.primitives import hull_planes
 from mjx_hand.pytree import pytree
 from mjx_hand.rigid.gains import Gains
-from mjx_hand.rigid.rigid_hand import RigidHand, stack_hands
+from mjx_hand.rigid.rigid_hand import RigidHand, finger_tips, stack_hands
 
 
 @pytree
@@ -28,6 +28,7 @@ class Reference:
         targets: the wrist's slides and turns, and the hinge angles, as demonstrated.
         controls: what to command so that the controllers are at each target when its frame comes, and press.
         grip: the share of the controls that presses the fingers on the object.
+        tips: finger tips in the world, as demonstrated, in the order of `hand.joints.FINGERS`.
         object_pose: in the world.
         base: world_from_base of each scene's wrist.
         features: object size (m), mass (kg), friction, and 1 for its kind among `OBJECT_KINDS`.
@@ -37,6 +38,7 @@ class Reference:
     targets: Float[Array, "d t 26"]
     controls: Float[Array, "d t 26"]
     grip: Float[Array, "d t 26"]
+    tips: Float[Array, "d t 5 3"]
     object_pose: Float[Array, "d t 7"]
     base: Float[Array, "d 3 3"]
     features: Float[Array, "d f"]
@@ -87,6 +89,7 @@ def make_reference(
         targets=targets,
         controls=anticipated(targets, gains, demonstrations[0].motion.fps) + grip,
         grip=grip,
+        tips=jnp.asarray(_tips(demonstrations, hands, frames), jnp.float32),
         object_pose=jnp.asarray(np.stack(poses), jnp.float32),
         base=jnp.asarray(np.stack(bases), jnp.float32),
         features=jnp.asarray(features, jnp.float32),
@@ -100,6 +103,19 @@ def object_in_hand(demonstration: Demonstration) -> tuple[Float[np.ndarray, "t 3
     object_rotation = Rotation.from_quat(demonstration.object_pose[:, 3:], scalar_first=True)
     offset = demonstration.object_pose[:, :3] - demonstration.motion.wrist_position
     return (wrist * object_rotation).as_matrix(), wrist.apply(offset)
+
+
+def _tips(
+    demonstrations: Sequence[Demonstration], hands: Sequence[RigidHand], frames: int
+) -> Float[np.ndarray, "d {frames} 5 3"]:
+    """Where demonstrations have their finger tips (m, world)."""
+    motions = [d.motion for d in demonstrations]
+    angles = jnp.asarray(np.stack([_padded(m.angles, frames) for m in motions]), jnp.float32)
+    tips = np.asarray(jax.jit(jax.vmap(finger_tips))(angles, stack_hands(hands)))
+    turns = (Rotation.from_quat(m.wrist_quaternion, scalar_first=True).as_matrix() for m in motions)
+    wrist = np.stack([_padded(rotation, frames) for rotation in turns])
+    place = np.stack([_padded(m.wrist_position, frames) for m in motions])
+    return np.einsum("dtij,dtfj->dtfi", wrist, tips) + place[:, :, None]
 
 
 def anticipated(targets: Float[Array, "d t 26"], gains: Gains, fps: float) -> Float[Array, "d t 26"]:
@@ -166,7 +182,7 @@ def _stacked_planes(hulls: Sequence[Float[np.ndarray, "_ _ 3"]]) -> Float[np.nda
 
 def _check(demonstrations: Sequence[Demonstration]) -> None:
     if not demonstrations:
-        raise InputError("no demonstrations given; make a set with envs.demonstrations.dataset.make_set")
+        raise InputError("no demonstrations given; make a set with envs.make_set")
     for what, values in (
         ("frame rates", {round(d.motion.fps, 6) for d in demonstrations}),
         ("sides", {d.motion.side for d in demonstrations}),

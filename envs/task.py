@@ -6,6 +6,7 @@ import math
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from envs.rewards import RewardWeights
 from mjx_hand.errors import InputError
 
 _STIFFEST = 600.0  # 1/s^2: a control step of 20 ms follows no stiffer spring
@@ -20,9 +21,9 @@ class Task:
         residual_scale_wrist_position, residual_scale_wrist_rotation, residual_scale_fingers: how far a residual of 1
             moves the wrist's slides, its turns and the hinges.
         smoothing: tau of the residual's filter, residual <- tau residual + (1 - tau) scale action.
-        reward_position_alpha, reward_rotation_alpha: alpha_p (1/m) and alpha_r (1/rad) of the paper's reward
-            exp(-alpha_p |p - p_ref|) + exp(-alpha_r angle) - action_cost |a|^2.
-        action_cost: weight of the last term.
+        rewards: weights of the reward's terms (`envs.rewards`).
+        reward_position_alpha, reward_rotation_alpha: alpha_p (1/m) and alpha_r (1/rad) of the terms
+            exp(-alpha_p |p - p_ref|) and exp(-alpha_r angle).
         termination_distance: an episode ends when the object is this far from its reference.
         termination_distance_last: what that distance has shrunk to, linearly, at the end of training; null leaves it.
         assist: stiffness (1/s^2) of a virtual controller that pulls the object along its reference at the beginning of
@@ -40,9 +41,9 @@ class Task:
     residual_scale_wrist_rotation: float = 0.10
     residual_scale_fingers: float = 0.35
     smoothing: float = 0.9
+    rewards: RewardWeights = dataclasses.field(default_factory=RewardWeights)
     reward_position_alpha: float = 30.0
     reward_rotation_alpha: float = 2.0
-    action_cost: float = 0.002
     termination_distance: float = 0.08
     termination_distance_last: float | None = None
     assist: float = 0.0
@@ -73,9 +74,8 @@ class Task:
             raise InputError(
                 f"task.assist is {self.assist}; it must lie between 0 and {_STIFFEST:g}, more shakes the object"
             )
-        for name, value in (("action_cost", self.action_cost), ("grip_force", self.grip_force or 0.0)):
-            if not value >= 0:
-                raise InputError(f"task.{name} is {value}; it must not be negative")
+        if self.grip_force is not None and not self.grip_force >= 0:
+            raise InputError(f"task.grip_force is {self.grip_force}; it must not be negative")
         if not self.lookahead or any(k < 1 for k in self.lookahead):
             raise InputError(
                 f"task.lookahead is {self.lookahead}; it must list frames ahead, each at least 1, such as [1,4,12]"

@@ -20,6 +20,7 @@ from envs.physics import make_engine
 from envs.physics.engine import PhysicsState
 from envs.reference import Reference, make_reference
 from envs.replay import assisted_replay
+from envs.rewards import TrackedStep, metric_names, weighted_terms
 from envs.scene import NUM_WRIST, OBJECT, demonstration_models
 from envs.task import Task
 from mjx_hand.errors import InputError
@@ -83,6 +84,11 @@ class TrackingEnv(Env):
         task: rewards, residual ranges, resets.
         gains: of the hand's position controllers.
 
+    Attributes:
+        demonstrations, hands: what it was built over.
+        models: MuJoCo's of each demonstration's scene.
+        tables: what it looks up; `with_tables` puts another set's in their place.
+
     Raises:
         InputError: demonstrations that do not fit together, a rate the task cannot keep, or an unknown engine.
     """
@@ -95,6 +101,7 @@ class TrackingEnv(Env):
         task: Task | None = None,
         gains: Gains | None = None,
     ):
+        self.demonstrations, self.hands = tuple(demonstrations), tuple(hands)
         self.task = Task() if task is None else task
         gains = Gains() if gains is None else gains
         reference = _cached_reference(demonstrations, hands, self.task.grip_force, gains)
@@ -174,7 +181,8 @@ class TrackingEnv(Env):
             residual=jnp.zeros(self.action_size),
         )
         zero = jnp.zeros(())
-        metrics = dict.fromkeys((*_TERMS, "error/position", "error/rotation", "unstable"), zero)
+        names = (*metric_names(self.task.rewards), "error/position", "error/rotation", "unstable")
+        metrics = dict.fromkeys(names, zero)
         info = {"truncation": zero, "progress": jnp.ones(())}
         return State(twin, self._observe(twin), zero, zero, metrics, info)  # type: ignore[call-arg]
 
@@ -191,14 +199,11 @@ class TrackingEnv(Env):
         if self.assisted:
             targets = jnp.concatenate([targets, self._assistance(twin, frame, progress)])
         physics = self.engine.step(twin.physics, targets)
+        before = twin.residual
         twin = Twin(physics=physics, demonstration=twin.demonstration, frame=frame, residual=residual)
 
         position, rotation = self._errors(twin)
-        terms = {
-            "reward/position": jnp.exp(-task.reward_position_alpha * position),
-            "reward/rotation": jnp.exp(-task.reward_rotation_alpha * rotation),
-            "reward/action": -task.action_cost * jnp.sum(action**2),
-        }
+        terms = weighted_terms(task.rewards, self._tracked(twin, position, rotation, action, residual - before))
         done = jnp.maximum((position > task.lost_distance(progress)).astype(jnp.float32), physics.unstable)
         finished = (frame >= self.reference.length[twin.demonstration] - 1).astype(jnp.float32)
         metrics = {**terms, "error/position": position, "error/rotation": rotation, "unstable": physics.unstable}
@@ -240,6 +245,22 @@ class TrackingEnv(Env):
     def _observe(self, twin: Twin) -> Float[Array, "o"]:
         return observe(self.reference, self.task, twin.demonstration, twin.frame, twin.physics, twin.residual)
 
+    def _tracked(self, twin: Twin, position: Array, rotation: Array, action: Array, moved: Array) -> TrackedStep:
+        """What the reward is counted from; `moved` is how far the residual went in this step."""
+        place = twin.demonstration, twin.frame
+        return TrackedStep(
+            position=position,
+            rotation=rotation,
+            position_alpha=self.task.reward_position_alpha,
+            rotation_alpha=self.task.reward_rotation_alpha,
+            hinges=twin.physics.qpos[NUM_WRIST : self.action_size],
+            hinges_reference=self.reference.targets[place][NUM_WRIST:],
+            tips=twin.physics.sensordata.reshape(5, 3),
+            tips_reference=self.reference.tips[place],
+            action=action,
+            change=moved / residual_scale(self.task),
+        )
+
     def _errors(self, twin: Twin) -> tuple[Array, Array]:
         """The object's distance (m) and angle (rad) from where the demonstration has it."""
         pose = self.reference.object_pose[twin.demonstration, twin.frame]
@@ -274,6 +295,3 @@ def _cached_reference(
     bare = [without_meshes(hand) for hand in hands]
     arrays = cached(compute, list(demonstrations), bare, grip_force, dataclasses.astuple(gains))
     return Reference(**{name: jnp.asarray(array) for name, array in arrays.items()})
-
-
-_TERMS = ("reward/position", "reward/rotation", "reward/action")

@@ -11,7 +11,7 @@ from pathlib import Path
 from mjx_hand.motion.demonstration import Demonstration, save_demonstration
 from train.experiment import bundled_policies
 from train.experiment.evaluate_seeds import median_and_worst
-from train.experiment.setup import make_setup, rolled_out
+from train.experiment.setup import load_env, rolled_out
 from train.learning.checkpoint import Checkpoint, save_checkpoint
 from train.settings.config import Config, command
 
@@ -26,10 +26,10 @@ def include(checkpoint: Checkpoint, demonstration: Demonstration, name: str) -> 
 
 def main(config: Config) -> None:
     """Choose the demonstration and write."""
-    setup = make_setup(config, "heldout")
-    checkpoint, _, scores = rolled_out(config, setup)
+    env = load_env(config, "heldout")
+    checkpoint, _, scores = rolled_out(config, env)
     _, median = median_and_worst({config.seed: scores})["median"]
-    for path in include(checkpoint, setup.demonstrations[median], config.name):
+    for path in include(checkpoint, env.demonstrations[median], config.name):
         print(f"{path}: {path.stat().st_size / 1000:.0f} kB")
 
 

@@ -16,8 +16,9 @@ import jax
 import numpy as np
 from matplotlib.figure import Figure
 
-from envs.demonstrations.dataset import set_folder
+from envs.demonstrations.set_settings import set_folder
 from mjx_hand.cli.retarget import retarget
+from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import FINGERS, LINKS
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion import load_motion_file
@@ -27,7 +28,7 @@ from mjx_hand.view.figures import plots
 from mjx_hand.view.report import Film, Headline, Plot, Report, Section, write_report
 from train.evaluate import show
 from train.experiment.evaluate_seeds import POLICY, REPLAY, ZERO, Results, evaluate_seeds, median_and_worst
-from train.experiment.setup import make_setup
+from train.experiment.setup import load_env, make_sets
 from train.learning.curve import Point
 from train.ppo import train
 from train.reports.evaluation_page import TRACKING, tables, tracking_plot
@@ -45,23 +46,26 @@ _TIPS = "Where that puts the finger tips, against the recording's own chain of r
 
 def main(config: Config) -> None:
     """The whole chain, then `report.html` in the experiment's folder."""
+    if config.data.folder:
+        raise InputError("the demo makes its own demonstrations; leave out data.folder, or train with train.ppo")
     out = Path(config.out)
     timings: list[tuple[str, float]] = []
 
     with _stage("demonstrations: performed, recorded with markers, fitted, projected", timings):
-        setup = make_setup(config, "train")
+        make_sets(config)
+        env = load_env(config, "train")
     recording = set_folder(config.data, config.demonstrations) / "heldout" / "000.motion.npz"
     with _stage("retargeting a recording", timings):
         errors = _retarget(recording, out / "retargeted.npz")
     with _stage("training", timings):
-        points = train(config, setup)
+        points = train(config, env)
     with _stage("evaluating on held-out demonstrations", timings):
         by_seed = evaluate_seeds([config])
         write_results(by_seed, [config], {})
         results = by_seed[config.seed]
     with _stage("video", timings):
         _, median = median_and_worst({config.seed: results.evaluations[POLICY]})["median"]
-        video = film(results.setup, results.rollouts[POLICY], median, out / "twin.mp4", _FILM)
+        video = film(results.env, results.rollouts[POLICY], median, out / "twin.mp4", _FILM)
     write_report(out / "report.html", _report(config, errors, points, results, video, timings))
     for table in tables(by_seed, config):
         show(table)
@@ -137,7 +141,7 @@ def _report(
         ),
         how=[
             *((name, clock(seconds)) for name, seconds in timings),
-            ("engine", f"{results.setup.env.engine.name}, {config.ppo.num_envs} worlds"),
+            ("engine", f"{results.env.engine.name}, {config.ppo.num_envs} worlds"),
             ("seed", str(config.seed)),
             ("machine", f"{processor()}, {len(jax.devices())} {jax.default_backend()} device(s)"),
             ("versions", ", ".join(f"{name} {version(name)}" for name in ("mjx-hand", "mujoco", "jax", "brax"))),

@@ -8,7 +8,7 @@ from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 from train.evaluate import evaluate_and_write
 from train.experiment.evaluate_seeds import shared_folder
-from train.experiment.setup import make_setup
+from train.experiment.setup import load_env, make_sets
 from train.learning.curve import is_finished, load_curve
 from train.ppo import train
 from train.reports.evaluation_record import cached_results
@@ -78,9 +78,10 @@ def measure(configs: Sequence[Config]) -> Experiment:
     folder = shared_folder(configs)
     summary = cached_results(configs) if finished and not configs[0].fresh else None
     if summary is None:
-        setup = make_setup(configs[0], "train")
+        make_sets(configs[0])
+        env = load_env(configs[0], "train")
         for config in configs:
-            train(config, setup)
+            train(config, env)
         evaluate_and_write(configs)
         summary = cached_results(configs)
         if summary is None:

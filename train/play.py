@@ -9,11 +9,12 @@ diverged in training instead: the state before the step, and each physics step o
 import dataclasses
 from pathlib import Path
 
+from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from mjx_hand.view.browser.viewer import Viewer
-from train.experiment.bundled_policies import bundled_policy, bundled_setup
+from train.experiment.bundled_policies import bundled_env, bundled_policy
 from train.experiment.evaluate_seeds import median_and_worst
-from train.experiment.setup import TrackingSetup, make_setup, rolled_out
+from train.experiment.setup import load_env, rolled_out
 from train.learning.unstable import load_unstable
 from train.settings.config import Config, command
 from train.view.play_scene import rollout_scene
@@ -36,8 +37,8 @@ def unstable_viewer(config: Config) -> Viewer:
         InputError: no such file, or one of other demonstrations.
     """
     unstable = load_unstable(config.play.unstable)
-    setup = make_setup(config, "train")
-    return Viewer(unstable_scene(unstable, setup, config.name), config.play.port)
+    env = load_env(config, "train")
+    return Viewer(unstable_scene(unstable, env, config.name), config.play.port)
 
 
 def rollout_viewer(config: Config) -> Viewer:
@@ -46,8 +47,8 @@ def rollout_viewer(config: Config) -> Viewer:
     Raises:
         InputError: no such demonstration, or what `chosen_checkpoint` and `Viewer` refuse.
     """
-    config, setup = _setup(config)
-    _, rollouts, scores = rolled_out(config, setup)
+    config, env = _env(config)
+    _, rollouts, scores = rolled_out(config, env)
     errors = scores.scores["tracking_error_cm"]
     index = config.play.demonstration
     if index is None:
@@ -56,18 +57,18 @@ def rollout_viewer(config: Config) -> Viewer:
         raise InputError(f"play.demonstration is {index}; there are {len(errors)}, numbered from 0")
     outcome = scores.failure[index] or "followed to the end"
     title = f"{config.name} {index}: {outcome}, {errors[index]:.2f} cm"
-    scene = rollout_scene(setup.demonstrations[index], rollouts, index, setup.hands[index], title)
+    scene = rollout_scene(env.demonstrations[index], rollouts, index, env.hands[index], title)
     return Viewer(scene, config.play.port)
 
 
-def _setup(config: Config) -> tuple[Config, TrackingSetup]:
+def _env(config: Config) -> tuple[Config, TrackingEnv]:
     """The demonstrations to play, and the configuration with the policy to play them."""
     included = bundled_policy(config.name)
     if config.checkpoint or included is None or (Path(config.out) / "best.npz").is_file():
-        return config, make_setup(config, "heldout")
+        return config, load_env(config, "heldout")
     print(f"nothing is trained in {config.out}: playing the policy that comes with mjx-hand", flush=True)
     config = dataclasses.replace(config, checkpoint=str(included))
-    return config, bundled_setup(config) if config.play.demonstration is None else make_setup(config, "heldout")
+    return config, bundled_env(config) if config.play.demonstration is None else load_env(config, "heldout")
 
 
 def main(config: Config) -> None:

@@ -18,9 +18,10 @@ from tensorboardX import SummaryWriter
 from envs.evaluation.evaluate import evaluate
 from envs.evaluation.roll_out import make_roll_out
 from envs.parallel import ParallelEnv
+from envs.tracking import TrackingEnv
 from mjx_hand.files.npz_archive import replacing
 from mjx_hand.progress import counter
-from train.experiment.setup import TrackingSetup, make_setup
+from train.experiment.setup import load_env, make_sets
 from train.learning.cadence import rollouts_per_demonstration, updates_between
 from train.learning.checkpoint import Checkpoint, save_checkpoint
 from train.learning.curve import Point
@@ -38,12 +39,12 @@ _LOG_SECONDS = 2.0  # between two lines of training metrics
 Watch = Callable[[Sequence["Point"], float], bool]
 
 
-def train(config: Config, setup: TrackingSetup | None = None, watch: Watch | None = None) -> list[Point]:
+def train(config: Config, env: TrackingEnv | None = None, watch: Watch | None = None) -> list[Point]:
     """Train, or go on, and return the evaluations, the first before any learning.
 
     Args:
         config: the experiment.
-        setup: its training part, where the caller has made it already.
+        env: its training part, where the caller has made it already.
         watch: told after each update of the evaluations so far, and of the seconds that those made here took together;
             where it says True the training ends there, its state saved.
 
@@ -53,19 +54,21 @@ def train(config: Config, setup: TrackingSetup | None = None, watch: Watch | Non
         SystemExit: it was interrupted (status 128 and the signal's number); its state is saved.
     """
     with run_folder(config) as folder:
-        return _train(config, setup, folder, watch)
+        return _train(config, env, folder, watch)
 
 
-def _train(config: Config, setup: TrackingSetup | None, folder: RunFolder, watch: Watch | None) -> list[Point]:
-    setup = make_setup(config, "train") if setup is None else setup
-    learner = Learner(ParallelEnv(setup.env, guard=config.debug.nan_guard), config.ppo)
+def _train(config: Config, env: TrackingEnv | None, folder: RunFolder, watch: Watch | None) -> list[Point]:
+    if env is None:
+        make_sets(config)
+        env = load_env(config, "train")
+    learner = Learner(ParallelEnv(env, guard=config.debug.nan_guard), config.ppo)
     state, points, seconds = _start(config, learner, folder)
-    run = _Run(config, setup, learner, folder, state, points, seconds)
+    run = _Run(config, env, learner, folder, state, points, seconds)
     if run.finished:
         print(f"{config.name!r} is trained already ({folder.path}); train it anew with fresh=true")
         return run.points
     print(
-        f"training {config.name!r} on {setup.env.num_demonstrations} demonstrations, engine {setup.env.engine.name}, "
+        f"training {config.name!r} on {env.num_demonstrations} demonstrations, engine {env.engine.name}, "
         f"learner on {described()}, {config.ppo.num_envs} worlds; results in {folder.path}",
         flush=True,
     )
@@ -98,26 +101,24 @@ class _Run:
     def __init__(
         self,
         config: Config,
-        setup: TrackingSetup,
+        env: TrackingEnv,
         learner: Learner,
         folder: RunFolder,
         state: LearnerState,
         points: list[Point],
         seconds: float,
     ):
-        self.config, self.setup, self.learner, self.folder = config, setup, learner, folder
+        self.config, self.env, self.learner, self.folder = config, env, learner, folder
         self.state, self.points = state, points
         self.updates = int(state.updates)
         self.last = config.ppo.budget
-        self.repeats = rollouts_per_demonstration(setup.env)
-        self.between = updates_between(config.checks, config.ppo, setup.env, self.repeats)
+        self.repeats = rollouts_per_demonstration(env)
+        self.between = updates_between(config.checks, config.ppo, env, self.repeats)
         self.start = time.monotonic() - seconds
         self.evaluating = 0.0  # seconds
-        policy = deterministic_policy(config.ppo, setup.env.observation_size, setup.env.action_size)
-        self.unstable = (
-            UnstableLog(folder.path / "unstable", setup.env, config.seed) if config.debug.nan_guard else None
-        )
-        self.roll_out = make_roll_out(setup.env, setup.hands, policy, repeats=self.repeats)
+        policy = deterministic_policy(config.ppo, env.observation_size, env.action_size)
+        self.unstable = UnstableLog(folder.path / "unstable", env, config.seed) if config.debug.nan_guard else None
+        self.roll_out = make_roll_out(env, policy, repeats=self.repeats)
 
     @property
     def steps(self) -> int:
@@ -182,7 +183,7 @@ class _Run:
     def _check(self, writer: SummaryWriter, params: Networks, steps: int) -> None:
         """All training demonstrations from frame 0; keeps the best policy, because curves are not monotone."""
         began = time.monotonic()
-        scores = evaluate(self.roll_out(params.policy), [d.object for d in self.setup.demonstrations]).rows()
+        scores = evaluate(self.roll_out(params.policy), [d.object for d in self.env.demonstrations]).rows()
         point = Point(
             steps=steps,
             seconds=time.monotonic() - self.start,
@@ -200,7 +201,7 @@ class _Run:
             steps=steps,
             success=point.success,
             experiment=self.config.name,
-            observation_size=self.setup.env.observation_size,
+            observation_size=self.env.observation_size,
         )
         if is_first():
             save_checkpoint(checkpoint, self.folder.path / "last.npz")

@@ -10,7 +10,9 @@ import numpy as np
 from PIL import Image
 
 from envs.demonstrations.contact_sheet import contact_sheet
-from envs.demonstrations.dataset import SetSettings, load_part, make_set
+from envs.demonstrations.dataset import make_set
+from envs.demonstrations.load_set import load_part
+from envs.demonstrations.set_settings import SetSettings
 from envs.demonstrations.twin_hands import twins
 from mjx_hand.progress import shares
 

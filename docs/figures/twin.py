@@ -23,10 +23,10 @@ def main() -> None:
     rollouts, scores = results.rollouts[POLICY], results.evaluations[POLICY].scores["tracking_error_cm"]
     index = int(np.argsort(scores)[len(scores) // 2])
     which = int(rollouts.demonstration[index])
-    demonstration = results.setup.demonstrations[which]
-    model = demonstration_model(demonstration, results.setup.hands[which], visual=True)
+    demonstration = results.env.demonstrations[which]
+    model = demonstration_model(demonstration, results.env.hands[which], visual=True)
     frames = (np.array(MOMENTS) * (demonstration.num_frames - 1)).astype(int)
-    targets = np.asarray(results.setup.env.reference.targets)[which, frames]
+    targets = np.asarray(results.env.reference.targets)[which, frames]
     wanted = np.concatenate([targets, rollouts.object_reference[index, frames]], axis=1)
     rows = [
         np.concatenate(list(render_frames(model, take, watched=wanted, size=SIZE)), axis=1)

@@ -19,11 +19,13 @@ from PIL import Image
 
 from envs.demonstrations.contact_sheet import contact_sheet
 from envs.demonstrations.contacts import check_contacts
-from envs.demonstrations.dataset import AS_RECORDED, PARTS, VARIED, YIELD, SetSettings, load_part, make_set
+from envs.demonstrations.dataset import AS_RECORDED, VARIED, YIELD, make_set
 from envs.demonstrations.from_recording.demonstration import RECORDED
+from envs.demonstrations.load_set import PARTS, load_part
 from envs.demonstrations.quality import check_part
 from envs.demonstrations.scripted.perform import OUTCOMES
 from envs.demonstrations.scripted.trials import NO_POSTURE, SPARE
+from envs.demonstrations.set_settings import SetSettings
 from envs.demonstrations.twin_hands import twins
 from envs.settings import from_dict
 from mjx_hand.cli.output import print_table
@@ -75,6 +77,8 @@ def main(arguments: Sequence[str]) -> None:
     """Make the set where it is missing, print its tables, write its picture; `config=all` does so for each type."""
     settings, root = settings_of(arguments)
     enable_compile_cache()
+    if settings.folder:
+        raise InputError(f"{settings.folder}: these demonstrations are finished; leave out data.folder to make a set")
     for single in settings.expand_types():
         _make_and_show(single, root)
 

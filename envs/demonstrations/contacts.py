@@ -8,8 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from envs.demonstrations.dataset import load_part
 from envs.demonstrations.from_recording.grasp_pose import capsule_gaps, last_phalanges
+from envs.demonstrations.load_set import load_part
 from envs.demonstrations.quality import LIFT
 from envs.demonstrations.twin_hands import twins
 from envs.reference import object_in_hand

@@ -1,4 +1,4 @@
-"""Demonstration sets on disk: made once by simulated capture, then read back.
+"""Demonstration sets are made once, by simulated capture or from a recording; `load_set` reads them.
 
 A set is a folder of `train/NNN.npz` and `heldout/NNN.npz` (schema mjx-hand/demonstration/2). Beside each stand the
 motion that was fitted to its markers, `NNN.motion.npz` (which `mjx-hand retarget` reads), and its truth,
@@ -7,107 +7,35 @@ people, object sizes and seeds. A set made from a real recording holds variation
 """
 
 import dataclasses
-import hashlib
 import json
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from envs.demonstrations.from_recording.demonstration import RECORDED, read_demonstration
-from envs.demonstrations.from_recording.variations import RecordingSettings, vary
-from envs.demonstrations.scripted.simulated_capture import CaptureSettings, project_recording, record_trials, save_truth
+from envs.demonstrations.from_recording.variations import vary
+from envs.demonstrations.load_set import PARTS, demonstration_files
+from envs.demonstrations.scripted.simulated_capture import project_recording, record_trials, save_truth
 from envs.demonstrations.scripted.trials import perform_trials
-from envs.grasps import grasp_names, grasp_type
-from mjx_hand.capture.datasets.dexmv_object import recording_files
+from envs.demonstrations.set_settings import SetSettings, set_folder
+from envs.grasps import grasp_type
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
-from mjx_hand.motion.demonstration import Demonstration, load_demonstration, save_demonstration
+from mjx_hand.motion.demonstration import load_demonstration, save_demonstration
 from mjx_hand.motion.motion import load_motion_file, save_motion
 from mjx_hand.pytree import replace
 from mjx_hand.retarget.hands import KinematicHands
 from mjx_hand.rigid.build import build_rigid_hand
 
-PARTS = ("train", "heldout")
-ALL = "all"
 YIELD = "yield.json"
 AS_RECORDED, VARIED = "as recorded", "varied"  # what a set from a recording counts
-_VERSION = 3  # of the generator: a change that makes other demonstrations of the same settings raises it
-_RECORDED_VERSION = 3  # the same of what is made of a recording
 _APART = 1_000_003  # between the seeds of the parts
 _SHAPE_LIMIT = 2.0  # standard deviations
 
 Report = Callable[[str, float], None]  # what is being done, and the share of it done
-
-
-@dataclasses.dataclass(frozen=True)
-class SetSettings:
-    """What a demonstration set holds.
-
-    Attributes:
-        grasp: name of the grasp type, "all" for a set of each type, or "recorded" for what a real recording shows.
-        people: random hand shapes in the training part.
-        heldout_people: others, in the held-out part.
-        trials: demonstrations of each person.
-        seed: of every draw; the held-out part uses the next one.
-        capture: how they are recorded.
-        recording: the real recording, and how it is varied; of the other settings it uses the seed.
-    """
-
-    grasp: str
-    people: int = 8
-    heldout_people: int = 4
-    trials: int = 8
-    seed: int = 0
-    capture: CaptureSettings = dataclasses.field(default_factory=CaptureSettings)
-    recording: RecordingSettings = dataclasses.field(default_factory=RecordingSettings)
-
-    def __post_init__(self):
-        if self.grasp not in (ALL, RECORDED):
-            grasp_type(self.grasp)
-        if (self.grasp == RECORDED) != bool(self.recording.path):
-            raise InputError(
-                f"data.grasp is {self.grasp!r} and data.recording.path {self.recording.path!r}; "
-                f"give both, data.grasp={RECORDED} and the recording's folder, or a grasp type and no recording"
-            )
-        for name in ("people", "heldout_people", "trials"):
-            if getattr(self, name) < 1:
-                raise InputError(f"data.{name} is {getattr(self, name)}; it must be at least 1")
-        if self.seed < 0:
-            raise InputError(f"data.seed is {self.seed}; it must not be negative")
-
-    def expand_types(self) -> tuple["SetSettings", ...]:
-        """The settings of the single sets that these stand for: one, or one of every grasp type."""
-        names = grasp_names() if self.grasp == ALL else [self.grasp]
-        return tuple(dataclasses.replace(self, grasp=name) for name in names)
-
-
-def set_folder(settings: SetSettings, root: str | Path) -> Path:
-    """Where a set of these settings lives below `root`: its name carries a digest of all settings and of the type."""
-    ingredients: list[Any] = [_VERSION, fingerprint(settings)]
-    recording = ingredients[1].pop("recording")
-    if settings.grasp == RECORDED:
-        files = _recording_files(settings.recording)
-        ingredients = [
-            _RECORDED_VERSION,
-            settings.seed,
-            recording,
-            *(hashlib.sha256(f.read_bytes()).hexdigest() for f in files),
-        ]
-    else:
-        grasp = dataclasses.asdict(grasp_type(settings.grasp))
-        del grasp["grip_force"]  # it is the twin's: the same demonstrations are made whatever it is
-        ingredients.append(grasp)
-    content = json.dumps(ingredients, sort_keys=True)
-    return Path(root) / f"{settings.grasp}-{hashlib.sha256(content.encode()).hexdigest()[:10]}"
-
-
-def fingerprint(settings: SetSettings) -> dict[str, Any]:
-    """All settings that tell sets apart, as in `CaptureSettings.fingerprint`."""
-    return dataclasses.asdict(settings) | {"capture": settings.capture.fingerprint()}
 
 
 def make_set(settings: SetSettings, root: str | Path, report: Report = lambda what, share: None) -> Path:
@@ -182,7 +110,7 @@ def _make_part(
 def _project_again(settings: SetSettings, usual: Path, folder: Path, report: Report) -> Mapping[str, Mapping[str, int]]:
     """Make both parts from the fitted motions of a set, with another projection; what came of that set's attempts."""
     hands, what = KinematicHands(axes=settings.capture.axes), f"projecting {settings.grasp} recordings"
-    paths = [path for part in PARTS for path in _demonstration_files(usual, part)]
+    paths = [path for part in PARTS for path in demonstration_files(usual, part)]
     for k, path in enumerate(paths):
         report(what, k / len(paths))
         demonstration, motion = load_demonstration(path), load_motion_file(path.with_suffix(".motion.npz"))
@@ -208,28 +136,3 @@ def _make_variations(settings: SetSettings, folder: Path, report: Report) -> Map
             made += 1
             report("varying the recording", made / (given.train + given.heldout))
     return {PARTS[0]: {VARIED: given.train}, PARTS[1]: {AS_RECORDED: 1, VARIED: given.heldout - 1}}
-
-
-def _recording_files(settings: RecordingSettings) -> tuple[Path, Path]:
-    try:
-        return recording_files(settings.path)
-    except InputError as error:
-        raise InputError(f"{error}: data.recording.path=FOLDER") from None
-
-
-def load_part(folder: str | Path, part: str) -> list[Demonstration]:
-    """The demonstrations of one part of a set, in order.
-
-    Raises:
-        InputError: no such part, or it holds none.
-    """
-    if part not in PARTS:
-        raise InputError(f"part {part!r} is not known; valid: {', '.join(PARTS)}")
-    return [load_demonstration(path) for path in _demonstration_files(folder, part)]
-
-
-def _demonstration_files(folder: str | Path, part: str) -> list[Path]:
-    paths = [p for p in sorted(Path(folder, part).glob("*.npz")) if p.stem.isdigit()]
-    if not paths:
-        raise InputError(f"{folder}: no {part} demonstrations; delete the folder and run again to make the set anew")
-    return paths

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from envs.demonstrations.dataset import load_part
+from envs.demonstrations.load_set import load_part
 from envs.demonstrations.scripted.simulated_capture import load_truth
 from mjx_hand.errors import InputError
 

@@ -1,6 +1,6 @@
 """Rolling a twin out: every demonstration from its first frame, unassisted, to its end and beyond."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
@@ -24,7 +24,6 @@ def zero_residual(parameters: object, observation: Float[Array, "n o"]) -> Float
 
 def make_roll_out(
     env: TrackingEnv,
-    hands: Sequence[RigidHand],
     policy: Callable[[object, Array], Array],
     hold: float = 0.0,
     repeats: int = 1,
@@ -35,7 +34,6 @@ def make_roll_out(
 
     Args:
         env: the environment.
-        hands: the twin's hand for each demonstration.
         policy: from (parameters, observations of all worlds) to actions.
         hold: how long the last target is held on after each demonstration (s).
         repeats: rollouts of each demonstration, one set after the other. They differ where an engine adds forces up in
@@ -74,7 +72,7 @@ def make_roll_out(
     frame = np.minimum(np.arange(steps + 1)[None], length[:, None] - 1)
     reference = np.asarray(env.reference.targets)[which[:, None], frame]
     pose = np.asarray(env.reference.object_pose)[which[:, None], frame]
-    base, bodies = env.reference.base[which], jax.tree.map(lambda leaf: leaf[which], stack_hands(hands))
+    base, bodies = env.reference.base[which], jax.tree.map(lambda leaf: leaf[which], stack_hands(env.hands))
     wanted_joints, wanted_tips = (np.asarray(a) for a in centres(reference, base, bodies))
     time = np.arange(steps + 1)[None]
     counted = time < length[:, None]

@@ -9,9 +9,13 @@ at the base, and the two hinges outwards.
 
 import dataclasses
 
+from mjx_hand.errors import InputError
+from mjx_hand.objects.description import OBJECT_KINDS
+
 Vector = tuple[float, float, float]
 Rows = tuple[Vector, Vector, Vector]
 
+SCRIPTED_KINDS = tuple(kind for kind in OBJECT_KINDS if kind != "mesh")  # whose size alone says their shape
 UNTURNED: Rows = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -77,7 +81,7 @@ class GraspType:
 
     Attributes:
         name: as in `config=NAME`.
-        object_kind: one of `objects.description.OBJECT_KINDS`.
+        object_kind: one of `SCRIPTED_KINDS`.
         object_size: smallest and largest size (half extents, or as the kind has them); drawn uniformly, one factor
             for all three, so that a cube stays a cube.
         object_mass, object_friction: ranges.
@@ -91,6 +95,9 @@ class GraspType:
         closing: how the hand opens and presses.
         lift, carry, turn: ranges of height (m), sideways way (m) and rotation (rad).
         grip_force: with which the reference of a twin presses (N), see `envs.grip`; demonstrations are made without.
+
+    Raises:
+        InputError: objects of another kind.
     """
 
     name: str
@@ -110,3 +117,10 @@ class GraspType:
     grip_force: float = 2.0
     support: tuple[Box, ...] = ()
     rest: float = 0.0
+
+    def __post_init__(self):
+        if self.object_kind not in SCRIPTED_KINDS:
+            raise InputError(
+                f"grasp type {self.name!r}: object_kind is {self.object_kind!r}, but scripted grasps draw objects by "
+                f"their size; valid: {', '.join(SCRIPTED_KINDS)} (a mesh can be in demonstrations given by data.folder)"
+            )

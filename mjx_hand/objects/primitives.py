@@ -35,10 +35,12 @@ def signed_distance(
     if kind == "capsule":
         beyond = jnp.maximum(jnp.abs(point[..., 2]) - size[..., 1], 0.0)
         return _norm(jnp.concatenate([point[..., :2], beyond[..., None]], axis=-1)) - size[..., 0]
-    if kind == "mesh" and planes is not None:
+    if kind == "mesh":
+        if planes is None:
+            raise InputError("a mesh needs the planes of its convex pieces: planes=hull_planes(description.hulls)")
         beyond = jnp.einsum("...k,hfk->...hf", point, planes[..., :3]) + planes[..., 3]
         return beyond.max(axis=-1).min(axis=-1)
-    raise InputError(f"object kind {kind!r} is not known; valid: box, sphere, cylinder, capsule, mesh with its planes")
+    raise InputError(f"object kind {kind!r} is not known; valid: box, sphere, cylinder, capsule, mesh")
 
 
 def hull_planes(hulls: Float[np.ndarray, "h v 3"]) -> Float[np.ndarray, "h f 4"]:

@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from envs.demonstrations.dataset import SetSettings, load_part, make_set
+from envs.demonstrations.dataset import make_set
+from envs.demonstrations.load_set import load_part
+from envs.demonstrations.set_settings import SetSettings
 from envs.demonstrations.twin_hands import twins
 from envs.tracking import TrackingEnv
 from mjx_hand.motion.demonstration import Demonstration

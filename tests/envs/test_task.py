@@ -3,8 +3,28 @@ import dataclasses
 import jax.numpy as jnp
 import pytest
 
+from envs.rewards import TERMS, RewardWeights, metric_names
 from envs.task import Task
 from mjx_hand.errors import InputError
+
+
+@pytest.mark.parametrize("weight", [-0.1, float("nan"), float("inf")])
+def test_weights_that_make_no_reward_are_refused(weight):
+    with pytest.raises(InputError, match=rf"task.rewards.tips is {weight}; it must be 0 or more"):
+        RewardWeights(tips=weight)
+
+
+def test_a_term_is_one_function_with_its_default_weight():
+    assert {name: (term.sign * term.weight) for name, term in TERMS.items()} == {
+        **{"position": 1.0, "rotation": 1.0, "action": -0.002},
+        **{"joints": 0.0, "tips": 0.0, "action_rate": 0.0},
+    }
+    assert dataclasses.asdict(Task().rewards) == {name: term.weight for name, term in TERMS.items()}
+    assert all(term.value.__name__ == name and term.value.__doc__ for name, term in TERMS.items())
+    assert metric_names(RewardWeights(action=0.0, tips=1.0)) == (
+        *("reward/position", "reward/rotation", "reward/action"),
+        "reward/tips",
+    )
 
 
 @pytest.mark.parametrize(
@@ -21,7 +41,6 @@ from mjx_hand.errors import InputError
         ({"smoothing": 1.0}, "would ignore every action"),
         ({"smoothing": 1.5}, "must lie between 0 and 1"),
         ({"random_start_prob": -0.1}, "task.random_start_prob is -0.1; it must lie between 0 and 1"),
-        ({"action_cost": float("nan")}, "task.action_cost is nan; it must not be negative"),
         ({"grip_force": -1.0}, "task.grip_force is -1.0; it must not be negative"),
         ({"lookahead": ()}, "it must list frames ahead"),
         ({"lookahead": (0, 1)}, "each at least 1"),

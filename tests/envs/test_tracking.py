@@ -1,9 +1,14 @@
+import copy
+import dataclasses
+
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from envs.rewards import RewardWeights
 from envs.task import Task
 from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
@@ -42,6 +47,43 @@ def test_the_reward_is_the_papers(env, start, step, action):
     assert float(state.reward) == pytest.approx(expected, abs=1e-4)
     assert float(state.metrics["error/position"]) == pytest.approx(distance, abs=1e-6)
     assert float(state.metrics["error/rotation"]) == pytest.approx(angle, abs=1e-4)
+
+
+def test_other_terms_count_by_their_weights(env, action):
+    """Joints, finger tips and the commands' smoothness, by NumPy from the state and the engine's own tip sites."""
+    weights = RewardWeights(position=0.0, rotation=2.0, action=0.0, joints=0.5, tips=0.25, action_rate=0.125)
+    weighted = copy.copy(env)
+    weighted.task = dataclasses.replace(env.task, rewards=weights)
+    before = weighted.start(jnp.asarray(1, jnp.int32), jnp.asarray(150, jnp.int32))
+    state = jax.jit(weighted.step)(before, action)
+    physics, reference = state.pipeline_state.physics, env.reference
+    off = np.asarray(physics.qpos[6:26]) - np.asarray(reference.targets)[1, 151, 6:]
+    apart = np.asarray(physics.sensordata).reshape(5, 3) - np.asarray(reference.tips)[1, 151]
+    rate = np.asarray(state.pipeline_state.residual) / np.array([0.02] * 3 + [0.1] * 3 + [0.35] * 20)
+    expected = {
+        "reward/position": 0.0,
+        "reward/rotation": 2 * np.exp(-2 * float(state.metrics["error/rotation"])),
+        "reward/action": 0.0,
+        "reward/joints": 0.5 * np.exp(-5 * np.abs(off).mean()),
+        "reward/tips": 0.25 * np.exp(-30 * np.linalg.norm(apart, axis=1).mean()),
+        "reward/action_rate": -0.125 * np.sum(rate**2),
+    }
+    found = {name: float(value) for name, value in state.metrics.items() if name.startswith("reward/")}
+    assert found == pytest.approx(expected, abs=1e-5)
+    assert float(state.reward) == pytest.approx(sum(expected.values()), abs=1e-5)
+    assert set(before.metrics) == set(state.metrics)
+    assert np.abs(off).max() > 1e-3
+    assert 1e-4 < np.linalg.norm(apart, axis=1).mean() < 0.05  # the demonstration's own tips, and not exactly
+
+
+def test_the_reference_has_its_tips_where_the_engine_has_them(env):
+    """A twin put into the demonstrated posture has its tip sites there."""
+    for which, frame in ((0, 0), (1, 120)):
+        data = mujoco.MjData(env.models[which])
+        data.qpos[:26] = np.asarray(env.reference.targets)[which, frame]
+        mujoco.mj_forward(env.models[which], data)
+        tips = np.asarray(env.reference.tips)[which, frame]
+        np.testing.assert_allclose(data.sensordata.reshape(5, 3), tips, atol=1e-5)
 
 
 def test_the_residual_is_filtered_and_scaled_and_commanded(env, start, step, action):

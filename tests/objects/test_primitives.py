@@ -91,3 +91,8 @@ def test_half_extents_bound_the_body(kind, wanted):
 def test_an_unknown_kind_is_refused():
     with pytest.raises(InputError, match=r"'cone' is not known; valid: box, sphere, cylinder, capsule"):
         signed_distance("cone", jnp.ones(3), jnp.zeros(3))
+
+
+def test_a_mesh_without_planes_is_told_what_it_needs():
+    with pytest.raises(InputError, match=r"a mesh needs the planes of its convex pieces: planes=hull_planes\("):
+        signed_distance("mesh", jnp.ones(3), jnp.zeros(3))

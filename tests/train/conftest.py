@@ -9,11 +9,12 @@ import pytest
 from filelock import FileLock
 
 import train.ppo
-from envs.demonstrations.dataset import SetSettings, make_set
+from envs.demonstrations.dataset import make_set
+from envs.demonstrations.set_settings import SetSettings
 from envs.evaluation.roll_out import make_roll_out
 from envs.parallel import ParallelEnv
 from envs.tracking import TrackingEnv
-from train.experiment.setup import TrackingSetup, make_setup
+from train.experiment.setup import load_env
 from train.learning.curve import Point
 from train.learning.learner import Learner
 from train.settings.config import Config
@@ -61,10 +62,10 @@ def compiled_once() -> Iterator[None]:
             learners[key] = Learner(parallel, ppo)  # which keeps the environment alive, and its id its own
         return learners[key]
 
-    def roll_out(env: TrackingEnv, hands: Any, policy: Any, repeats: int) -> Any:
+    def roll_out(env: TrackingEnv, policy: Any, repeats: int) -> Any:
         assert repeats == 1, "on a CPU"
         if id(env) not in rollers:
-            rollers[id(env)] = make_roll_out(env, hands, policy)
+            rollers[id(env)] = make_roll_out(env, policy)
         return rollers[id(env)]
 
     with pytest.MonkeyPatch.context() as patched:
@@ -74,11 +75,11 @@ def compiled_once() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def setup(tiny: Config) -> TrackingSetup:
-    return make_setup(tiny, "train")
+def env(tiny: Config) -> TrackingEnv:
+    return load_env(tiny, "train")
 
 
 @pytest.fixture(scope="session")
-def trained(tiny: Config, setup: TrackingSetup) -> tuple[Path, list[Point]]:
+def trained(tiny: Config, env: TrackingEnv) -> tuple[Path, list[Point]]:
     """The folder of a finished training, and what it returned."""
-    return Path(tiny.out), train.ppo.train(tiny, setup)
+    return Path(tiny.out), train.ppo.train(tiny, env)

@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 
+from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from tests.train.test_results import curve, row, summary
 from train import ablations, experiments
 from train.ablations import Plan, plan, run
 from train.experiment.evaluate_seeds import POLICY, REPLAY, ZERO
-from train.experiment.setup import TrackingSetup
 from train.learning.curve import Point
-from train.learning.run_folder import _plain, _settings, run_folder
+from train.learning.run_folder import _settings, _told, run_folder
 from train.ppo import _write_curve
 from train.reports.ablations_page import Ablation, ablation_table, write_ablations_page
 from train.reports.ablations_variants import UNCHANGED, VARIANTS
@@ -49,7 +49,7 @@ def test_every_variant_changes_what_it_says_and_nothing_else():
     (unchanged,) = planned.variants[0][1]
     for variant, (config,) in planned.variants:
         said = {override.partition("=")[0] for override in variant.overrides}
-        now, before = _settings(_plain(config)), _settings(_plain(unchanged))
+        now, before = _settings(_told(config)), _settings(_told(unchanged))
         assert {name for name in now if now[name] != before[name]} == said, variant.name
         assert bool(said) == (variant.learns and variant != UNCHANGED)
 
@@ -129,7 +129,7 @@ def work(monkeypatch, tmp_path) -> list[str]:
     done: list[str] = []
     monkeypatch.chdir(tmp_path)
 
-    def train(config: Config, setup: Any) -> None:
+    def train(config: Config, env: Any) -> None:
         done.append(f"train {Path(config.out).parent.name} {config.seed}")
         Path(config.out).mkdir(parents=True, exist_ok=True)
         _write_curve(curve(0.1, 0.96), Path(config.out) / "curve.csv")
@@ -138,7 +138,8 @@ def work(monkeypatch, tmp_path) -> list[str]:
         content = summary("spherical", [1.0] * len(configs)) | {"made_of": evaluation_fingerprint(configs)}
         (Path(configs[0].out).parent / "evaluation.json").write_text(json.dumps(content))
 
-    monkeypatch.setattr(experiments, "make_setup", lambda config, part: None)
+    monkeypatch.setattr(experiments, "load_env", lambda config, part: None)
+    monkeypatch.setattr(experiments, "make_sets", lambda config: None)
     monkeypatch.setattr(experiments, "train", train)
     monkeypatch.setattr(experiments, "evaluate_and_write", evaluate)
     monkeypatch.setattr(experiments, "enable_compile_cache", lambda: None)
@@ -158,10 +159,10 @@ def test_what_is_done_is_kept_and_the_rest_goes_on(work: list[str]):
 
 
 def test_variants_that_are_done_are_shown_while_others_wait(work: list[str], monkeypatch, capsys):
-    def train(config: Config, setup: Any) -> None:
+    def train(config: Config, env: Any) -> None:
         if config.task.grip_force == 0:
             raise InputError("the disk is full")
-        first(config, setup)
+        first(config, env)
 
     first = experiments.train
     monkeypatch.setattr(experiments, "train", train)
@@ -171,10 +172,11 @@ def test_variants_that_are_done_are_shown_while_others_wait(work: list[str], mon
 
 
 def test_a_tiny_training_and_its_baselines(
-    trained: tuple[Path, list[Point]], tiny: Config, setup: TrackingSetup, tmp_path, monkeypatch
+    trained: tuple[Path, list[Point]], tiny: Config, env: TrackingEnv, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(experiments, "make_setup", lambda config, part: setup)
-    monkeypatch.setattr(video, "side_by_side", lambda setup, rollouts, index, path: Path(path).write_bytes(b"film"))
+    monkeypatch.setattr(experiments, "load_env", lambda config, part: env)
+    monkeypatch.setattr(experiments, "make_sets", lambda config: None)
+    monkeypatch.setattr(video, "side_by_side", lambda env, rollouts, index, path: Path(path).write_bytes(b"film"))
     out = tmp_path / "tiny" / "as_configured" / "seed0"
     shutil.copytree(trained[0], out)
     configs = [Config(**{**vars(tiny), "out": str(out)})]

@@ -12,7 +12,7 @@ from mjx_hand.motion.resample import quaternion_matrices
 from mjx_hand.view.browser.scene import Layer, MeshLayer
 from mjx_hand.view.browser.viewer import Viewer
 from tests.view.browser.chromium import find_chromium, page
-from train.experiment.setup import chosen_checkpoint, make_setup
+from train.experiment.setup import chosen_checkpoint, load_env
 from train.learning.curve import Point
 from train.learning.policy import deterministic_policy
 from train.play import viewer
@@ -36,10 +36,10 @@ def layer(shown: Viewer, name: str) -> MeshLayer:
 
 
 def test_it_shows_where_twin_and_object_were(playing: Viewer, tiny: Config):
-    setup = make_setup(tiny, "heldout")
-    checkpoint = chosen_checkpoint(tiny, setup.env.observation_size)
-    policy = deterministic_policy(tiny.ppo, setup.env.observation_size, setup.env.action_size)
-    rollouts = make_roll_out(setup.env, setup.hands, policy)(checkpoint.policy)
+    env = load_env(tiny, "heldout")
+    checkpoint = chosen_checkpoint(tiny, env.observation_size)
+    policy = deterministic_policy(tiny.ppo, env.observation_size, env.action_size)
+    rollouts = make_roll_out(env, policy)(checkpoint.policy)
     frames = playing.scene.num_frames
     assert frames == rollouts.counted[0].sum()
     np.testing.assert_allclose(layer(playing, "twin").transforms[..., :3, 3], rollouts.joints[0, :frames], atol=1e-5)

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from omegaconf import OmegaConf
 
+from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from train.experiment.evaluate_seeds import POLICY, ZERO, evaluate_checkpoint
-from train.experiment.setup import TrackingSetup, chosen_checkpoint
+from train.experiment.setup import chosen_checkpoint
 from train.learning.checkpoint import load_checkpoint, save_checkpoint
 from train.learning.curve import Point
 from train.ppo import train
@@ -68,17 +69,17 @@ def test_the_folder_holds_what_it_takes_to_go_on(trained: Trained, tiny: Config)
     assert written == OmegaConf.create(json.loads(json.dumps(dataclasses.asdict(tiny))))
 
 
-def test_checkpoints_say_where_they_come_from(trained: Trained, setup: TrackingSetup):
+def test_checkpoints_say_where_they_come_from(trained: Trained, env: TrackingEnv):
     out, points = trained
     last, best = load_checkpoint(out / "last.npz"), load_checkpoint(out / "best.npz")
-    assert (last.steps, last.experiment, last.observation_size) == (64, "tiny", setup.env.observation_size)
+    assert (last.steps, last.experiment, last.observation_size) == (64, "tiny", env.observation_size)
     chosen = min(points, key=lambda point: (-point.success, point.tracking_error_cm))
     assert (best.steps, best.success) == (chosen.steps, chosen.success)
 
 
-def test_learning_changes_every_layer(trained: Trained, tiny: Config, setup: TrackingSetup, tmp_path):
+def test_learning_changes_every_layer(trained: Trained, tiny: Config, env: TrackingEnv, tmp_path):
     out, _ = trained
-    stopped = train(in_folder(tiny, tmp_path, checks=Checks(every=32, stop_at=0.0)), setup)
+    stopped = train(in_folder(tiny, tmp_path, checks=Checks(every=32, stop_at=0.0)), env)
     assert [point.steps for point in stopped] == [0], "stop_at was reached before any learning"
     before, after = arrays(tmp_path / "last.npz"), arrays(out / "last.npz")
     layers = [name for name in after if name.startswith(("policy/", "value/"))]
@@ -91,7 +92,7 @@ def test_learning_changes_every_layer(trained: Trained, tiny: Config, setup: Tra
 
 
 def test_a_training_that_is_watched_can_be_ended_and_goes_on(
-    trained: Trained, tiny: Config, setup: TrackingSetup, tmp_path
+    trained: Trained, tiny: Config, env: TrackingEnv, tmp_path
 ):
     out, _ = trained
     seen: list[tuple[int, int, float]] = []
@@ -100,22 +101,20 @@ def test_a_training_that_is_watched_can_be_ended_and_goes_on(
         seen.append((len(points), points[-1].steps, evaluating))
         return True
 
-    stopped = train(in_folder(tiny, tmp_path), setup, enough)
+    stopped = train(in_folder(tiny, tmp_path), env, enough)
     assert [point.steps for point in stopped] == [0, 32]  # an update is 32 steps, after which it is asked
     ((count, steps, evaluating),) = seen
     assert (count, steps) == (2, 32)
     assert 0 < evaluating < stopped[-1].seconds
-    train(in_folder(tiny, tmp_path), setup)
+    train(in_folder(tiny, tmp_path), env)
     first, second = arrays(out / "last.npz"), arrays(tmp_path / "last.npz")
     for key in first:
         np.testing.assert_array_equal(second[key], first[key])
 
 
-def test_the_same_seed_gives_the_same_policy_bit_for_bit(
-    trained: Trained, tiny: Config, setup: TrackingSetup, tmp_path
-):
+def test_the_same_seed_gives_the_same_policy_bit_for_bit(trained: Trained, tiny: Config, env: TrackingEnv, tmp_path):
     out, points = trained
-    again = train(in_folder(tiny, tmp_path), setup)
+    again = train(in_folder(tiny, tmp_path), env)
     assert [(p.steps, p.success, p.tracking_error_cm, p.rotation_error_deg) for p in again] == [
         (p.steps, p.success, p.tracking_error_cm, p.rotation_error_deg) for p in points
     ]
@@ -134,9 +133,9 @@ def test_a_folder_that_cannot_be_written_is_refused_before_any_work(tiny: Config
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
-def test_a_checkpoint_of_another_task_is_refused(trained: Trained, tiny: Config, setup: TrackingSetup, tmp_path):
+def test_a_checkpoint_of_another_task_is_refused(trained: Trained, tiny: Config, env: TrackingEnv, tmp_path):
     out, _ = trained
-    size = setup.env.observation_size
+    size = env.observation_size
     other = dataclasses.replace(load_checkpoint(out / "best.npz"), observation_size=size + 1)
     save_checkpoint(other, tmp_path / "other.npz")
     with pytest.raises(InputError, match=f"reads {size + 1} observations, this task gives {size}; use the task"):

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from envs.evaluation.failure import FAILURES
+from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from train import experiments, results
-from train.experiment.setup import TrackingSetup
 from train.learning.curve import Point, is_finished, load_curve, minutes_to_learn
 from train.ppo import _write_curve
 from train.reports.evaluation_record import evaluation_fingerprint
@@ -202,7 +202,7 @@ def work(monkeypatch, tmp_path) -> list[str]:
     done: list[str] = []
     monkeypatch.chdir(tmp_path)
 
-    def train(config: Config, setup: TrackingSetup) -> None:
+    def train(config: Config, env: TrackingEnv) -> None:
         done.append(f"train {config.name} {config.seed}")
         Path(config.out).mkdir(parents=True, exist_ok=True)
         _write_curve(curve(0.1, 0.96, minutes=config.seed + 1.0), Path(config.out) / "curve.csv")
@@ -212,7 +212,8 @@ def work(monkeypatch, tmp_path) -> list[str]:
         content = summary(configs[0].data.grasp, [1.0] * len(configs)) | {"made_of": evaluation_fingerprint(configs)}
         (Path(configs[0].out).parent / "evaluation.json").write_text(json.dumps(content))
 
-    monkeypatch.setattr(experiments, "make_setup", lambda config, part: None)
+    monkeypatch.setattr(experiments, "load_env", lambda config, part: None)
+    monkeypatch.setattr(experiments, "make_sets", lambda config: None)
     monkeypatch.setattr(experiments, "train", train)
     monkeypatch.setattr(experiments, "evaluate_and_write", evaluate)
     monkeypatch.setattr(experiments, "enable_compile_cache", lambda: None)
@@ -236,10 +237,10 @@ def test_what_is_done_is_kept_and_the_rest_goes_on(work: list[str], capsys):
 
 
 def test_one_experiment_that_is_done_is_shown_while_others_wait(work: list[str], monkeypatch):
-    def train(config: Config, setup: TrackingSetup) -> None:
+    def train(config: Config, env: TrackingEnv) -> None:
         if config.name == "lateral":
             raise InputError("the disk is full")
-        first(config, setup)
+        first(config, env)
 
     first = experiments.train
     monkeypatch.setattr(experiments, "train", train)
@@ -252,7 +253,8 @@ def test_ctrl_c_ends_in_one_line(work: list[str], monkeypatch, capsys):
     def stop(config: Config, part: str) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(experiments, "make_setup", stop)
+    monkeypatch.setattr(experiments, "load_env", stop)
+    monkeypatch.setattr(experiments, "make_sets", lambda config: None)
     assert results.main(["names=[pinch]", "seeds=[0,1]", "ppo.num_timesteps=1000"]) == 130
     assert capsys.readouterr().err == "\nresults: stopped; the same command goes on from here\n"
 

@@ -27,10 +27,9 @@ from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.progress import counter
 from train.benchmark.contestants import make_script
-from train.benchmark.engines import config
+from train.benchmark.engines import small_env
 from train.benchmark.report_files import write_report
 from train.benchmark.solver import CHOSEN, SWEEP, Settings, newton
-from train.experiment.setup import make_setup
 from train.reports.machine import machine
 
 SCHEMA = "mjx-hand/benchmark-convergence/1"
@@ -93,7 +92,7 @@ def report(options: Options) -> list[str]:
         counter(len(grasps) * (options.runs * len(COMPARED) + 1), "stepping") as advance,
     ):
         for grasp in grasps:
-            env = make_setup(config("native", grasp, options.demonstrations), "train").env
+            env = small_env("native", grasp, options.demonstrations)
             state, controls = moments(env, options.worlds)
             solved = {name: _ends(_stepper(env, settings), state, controls) for name, settings in _ENDS.items()}
             advance(1)

@@ -13,12 +13,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
-from envs.demonstrations.dataset import SetSettings
+from envs.demonstrations.set_settings import SetSettings
 from envs.grasps import grasp_names, grasp_type
 from envs.physics import ENGINES, default_engine
 from envs.physics.native import cores
 from envs.scene import TIMESTEP
 from envs.task import Task
+from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from mjx_hand.progress import counter
 from train.benchmark.contestants import Contestant, environment, open_rollout, physics, step_loop
@@ -26,7 +27,7 @@ from train.benchmark.engine_report import Results, Row, text, write
 from train.benchmark.learning import Learning, measure_learning
 from train.benchmark.memory import fitting, with_memory
 from train.benchmark.timing import rates
-from train.experiment.setup import TrackingSetup, make_setup
+from train.experiment.setup import load_env, make_sets
 from train.reports.machine import accelerator
 from train.settings.config import Config
 
@@ -93,19 +94,18 @@ def report(options: Options) -> list[str]:
     with contextlib.redirect_stdout(sys.stderr):  # progress; the report alone goes to standard output
         for grasp in grasps:
             here = [name for name in engines if name == "native" or grasp in compiled]
-            setups = {
-                name: make_setup(config(name, grasp, options.demonstrations), "train")
-                for name in dict.fromkeys((*here, "native"))
+            environments = {
+                name: small_env(name, grasp, options.demonstrations) for name in dict.fromkeys((*here, "native"))
             }
-            entered = list(_enter(setups, here, options, notes))
+            entered = list(_enter(environments, here, options, notes))
             with counter(options.runs * len(entered), f"timing {grasp}") as advance:
                 measured = rates(entered, options.runs, options.seconds, advance)
             rows += [
-                Row.of(grasp, c, rate, setups["native"].env.dt, task.substeps)
+                Row.of(grasp, c, rate, environments["native"].dt, task.substeps)
                 for c, rate in zip(entered, measured, strict=True)
             ]
             if options.ppo and default_engine() in here:
-                learning.append(_learning(options, grasp, setups, entered))
+                learning.append(_learning(options, grasp, environments, entered))
     results = Results(rows=rows, learning=learning, notes=notes, substeps=task.substeps, dt=task.substeps * TIMESTEP)
     kept = ("grasps", "engines", "compiled", "worlds", "full", "runs", "seconds")
     lines = text(results)
@@ -151,13 +151,20 @@ def config(engine: str, grasp: str, demonstrations: Path) -> Config:
     return Config(name="benchmark", engine=engine, data=data, demonstrations=str(demonstrations))
 
 
+def small_env(engine: str, grasp: str, demonstrations: Path) -> TrackingEnv:
+    """The environment of `config`; its set is made where it is missing."""
+    measured = config(engine, grasp, demonstrations)
+    make_sets(measured)
+    return load_env(measured, "train")
+
+
 def _enter(
-    setups: Mapping[str, TrackingSetup], engines: Sequence[str], options: Options, notes: list[str]
+    environments: Mapping[str, TrackingEnv], engines: Sequence[str], options: Options, notes: list[str]
 ) -> Iterator[Contestant]:
     """All contestants, compiled and run once. The environment is entered on the engine that training picks here."""
     worlds = sorted(set(options.worlds))
     for name in engines:
-        env = setups[name].env
+        env = environments[name]
         parts = [physics, environment] if name == default_engine() else [physics]
         for enter, scope in zip(parts, ("physics", "environment"), strict=False):
             for count in _counts(worlds, options.full and name != "native"):
@@ -167,7 +174,7 @@ def _enter(
                     notes.append(f"{name}, {scope}: {count:,} worlds do not fit into memory")
                     break
                 yield contestant
-    native = setups["native"].env
+    native = environments["native"]
     yield with_memory(functools.partial(step_loop, native))
     for count in worlds:
         yield with_memory(functools.partial(open_rollout, native, count, cores()))
@@ -183,7 +190,7 @@ def _counts(worlds: Sequence[int], full: bool) -> Iterator[int]:
 
 
 def _learning(
-    options: Options, grasp: str, setups: Mapping[str, TrackingSetup], entered: Sequence[Contestant]
+    options: Options, grasp: str, environments: Mapping[str, TrackingEnv], entered: Sequence[Contestant]
 ) -> Learning:
     name = default_engine()
     most = max(options.worlds)
@@ -193,4 +200,4 @@ def _learning(
     )
     print(f"training {grasp} on {name}, {most} worlds", flush=True)
     composed = config(name, grasp, options.demonstrations)
-    return measure_learning(composed, setups[name], alone, around, options.runs, options.seconds)
+    return measure_learning(composed, environments[name], alone, around, options.runs, options.seconds)

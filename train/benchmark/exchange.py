@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.scene import base_rotation, scene_spec
+from envs.tracking import TrackingEnv
 from train.benchmark.contestants import Script, make_script
-from train.experiment.setup import TrackingSetup
 
 _PICTURES = ("vis", "cam_", "light_", "mat_", "tex_", "skin_")
 # MuJoCo 4 says that a position actuator is told a position. Earlier versions cannot read that, and need not: gains and
@@ -35,19 +35,19 @@ class Start(NamedTuple):
     qvel: Float[np.ndarray, "n nv"]
 
 
-def make_start(setup: TrackingSetup, worlds: int) -> Start:
+def make_start(env: TrackingEnv, worlds: int) -> Start:
     """The script of a number of worlds."""
-    script = make_script(setup.env, worlds)
-    state = jax.jit(jax.vmap(setup.env.start))(script.variant, script.frame).pipeline_state.physics
+    script = make_script(env, worlds)
+    state = jax.jit(jax.vmap(env.start))(script.variant, script.frame).pipeline_state.physics
     script = Script(script.variant, script.frame, script.controls.astype(np.float32))
     return Start(script, np.asarray(state.qpos), np.asarray(state.qvel))
 
 
-def scene_xml(setup: TrackingSetup) -> str:
+def scene_xml(env: TrackingEnv) -> str:
     """The MJCF of the environment's scenes, which are alike but for numbers, as MuJoCo 3 reads it too."""
-    most = max(range(len(setup.demonstrations)), key=lambda k: len(setup.demonstrations[k].support))
-    d = setup.demonstrations[most]
-    spec = scene_spec(setup.hands[most], d.object, d.support, d.support_position, base_rotation(d))
+    most = max(range(len(env.demonstrations)), key=lambda k: len(env.demonstrations[k].support))
+    d = env.demonstrations[most]
+    spec = scene_spec(env.hands[most], d.object, d.support, d.support_position, base_rotation(d))
     spec.compile()
     return spec.to_xml().replace(_INPUT, "")
 
@@ -82,9 +82,9 @@ def _covering(boxes: Float[np.ndarray, "m n 6"]) -> Float[np.ndarray, "m n 6"]:
     return np.broadcast_to(np.concatenate([(low + high) / 2, (high - low) / 2], axis=-1), boxes.shape)
 
 
-def write_scene(folder: Path, setup: TrackingSetup, settings: Mapping[str, Sequence[mujoco.MjModel]]) -> None:
+def write_scene(folder: Path, env: TrackingEnv, settings: Mapping[str, Sequence[mujoco.MjModel]]) -> None:
     """Write `scene.xml`, and `NAME.npz` with the numbers of each setting's models."""
-    (folder / "scene.xml").write_text(scene_xml(setup))
+    (folder / "scene.xml").write_text(scene_xml(env))
     for name, models in settings.items():
         np.savez(folder / f"{name}.npz", allow_pickle=False, **numbers(models))
 

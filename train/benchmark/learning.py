@@ -6,9 +6,9 @@ import time
 import jax
 
 from envs.parallel import ParallelEnv
+from envs.tracking import TrackingEnv
 from train.benchmark.contestants import Contestant
 from train.benchmark.timing import Rate, enough_steps, rate_once
-from train.experiment.setup import TrackingSetup
 from train.learning.learner import Learner
 from train.settings.config import Config
 
@@ -39,7 +39,7 @@ class Learning:
 
 
 def measure_learning(
-    config: Config, setup: TrackingSetup, alone: Contestant, around: Contestant, runs: int, seconds: float
+    config: Config, env: TrackingEnv, alone: Contestant, around: Contestant, runs: int, seconds: float
 ) -> Learning:
     """Make `runs` updates; between them engine and environment run alone, to compare at the same moment.
 
@@ -54,7 +54,7 @@ def measure_learning(
     Raises:
         InputError: a number of worlds that PPO cannot split into its minibatches.
     """
-    learner = Learner(ParallelEnv(setup.env), dataclasses.replace(config.ppo, num_envs=alone.worlds))
+    learner = Learner(ParallelEnv(env), dataclasses.replace(config.ppo, num_envs=alone.worlds))
     state = learner.initial(0)
     began = time.perf_counter()
     state, _ = jax.block_until_ready(learner.update(state, 0.0))
@@ -70,7 +70,7 @@ def measure_learning(
     rate = Rate.of(trained)
     return Learning(
         grasp=config.data.grasp,
-        engine=setup.env.engine.name,
+        engine=env.engine.name,
         worlds=alone.worlds,
         compile_seconds=first - learner.steps_per_update / rate.median,
         rate=rate,

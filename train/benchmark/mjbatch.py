@@ -21,16 +21,16 @@ import numpy as np
 
 from envs.physics import solver
 from envs.physics.native import NativeEngine, cores
+from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from mjx_hand.progress import counter
 from train.benchmark import entrants
 from train.benchmark.contestants import PASS
-from train.benchmark.engines import config
+from train.benchmark.engines import small_env
 from train.benchmark.entrants import Entrant
 from train.benchmark.exchange import make_start, write_scene, write_script
 from train.benchmark.mjbatch_process import INSTALL, MjbatchProcess
 from train.benchmark.mjbatch_report import Results, Row, text, write
-from train.experiment.setup import TrackingSetup, make_setup
 
 _SETTINGS = {"PGS 15": solver.gauss_seidel, "Newton 10": solver.newton}
 
@@ -78,14 +78,14 @@ def report(options: Options) -> list[str]:
         else:
             process = stack.enter_context(MjbatchProcess(options.python, folder))
             versions = process.versions
-        setup = make_setup(config("native", "pinch", options.demonstrations), "train")
-        models = {name: setting(setup.env.models) for name, setting in _SETTINGS.items()}
-        write_scene(folder, setup, models)
+        env = small_env("native", "pinch", options.demonstrations)
+        models = {name: setting(env.models) for name, setting in _SETTINGS.items()}
+        write_scene(folder, env, models)
         advance = stack.enter_context(counter(len(models) * len(options.worlds) * options.rounds, "timing"))
         for name in models:
-            engine = NativeEngine(models[name], setup.env.engine.substeps, threads)
+            engine = NativeEngine(models[name], env.engine.substeps, threads)
             for count in options.worlds:
-                entered = list(_enter(setup, engine, name, count, threads, process, folder, notes))
+                entered = list(_enter(env, engine, name, count, threads, process, folder, notes))
                 spent = _rounds(entered, options.rounds, options.seconds, advance)
                 ends = [entrant.end() for entrant in entered]
                 steps = count * PASS * engine.substeps
@@ -107,7 +107,7 @@ def _check(options: Options) -> None:
 
 
 def _enter(
-    setup: TrackingSetup,
+    env: TrackingEnv,
     engine: NativeEngine,
     setting: str,
     count: int,
@@ -117,7 +117,7 @@ def _enter(
     notes: list[str],
 ) -> Iterator[Entrant]:
     """All that step so many worlds under one setting."""
-    start = make_start(setup, count)
+    start = make_start(env, count)
     yield entrants.native(engine, start)
     for current in (True, False):
         yield entrants.mujoco_batch(engine, start, threads, current)

@@ -5,7 +5,6 @@ from pathlib import Path
 from envs.demonstrations.twin_hands import twins
 from envs.tracking import TrackingEnv
 from mjx_hand.motion.demonstration import load_demonstration
-from train.experiment.setup import TrackingSetup
 from train.settings.config import Config
 
 FOLDER = Path(__file__).parent.parent / "policies"
@@ -17,11 +16,10 @@ def bundled_policy(name: str) -> Path | None:
     return path if path.is_file() else None
 
 
-def bundled_setup(config: Config) -> TrackingSetup:
+def bundled_env(config: Config) -> TrackingEnv:
     """The environment over the one demonstration that comes with the experiment's policy."""
     demonstrations = [load_demonstration(demonstration_path(config.name))]
-    hands = twins(demonstrations)
-    return TrackingSetup(demonstrations, hands, TrackingEnv(demonstrations, hands, config.engine, config.task))
+    return TrackingEnv(demonstrations, twins(demonstrations), config.engine, config.task)
 
 
 def demonstration_path(name: str) -> Path:

@@ -14,9 +14,10 @@ import numpy as np
 from envs.evaluation.evaluate import Evaluation, evaluate
 from envs.evaluation.roll_out import make_roll_out, zero_residual
 from envs.evaluation.rollout import Rollouts
+from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from mjx_hand.progress import counter
-from train.experiment.setup import TrackingSetup, chosen_checkpoint, make_setup, without_grip
+from train.experiment.setup import chosen_checkpoint, load_env, without_grip
 from train.learning.checkpoint import Checkpoint
 from train.learning.policy import deterministic_policy
 from train.settings.config import Config
@@ -29,7 +30,7 @@ POLICY, ZERO, REPLAY = "policy", "zero residual", "demonstration alone"
 class Results:
     """Rollouts and their scores, by column title, of one seed's policy and the baselines."""
 
-    setup: TrackingSetup
+    env: TrackingEnv
     checkpoint: Checkpoint
     rollouts: Mapping[str, Rollouts]
     evaluations: Mapping[str, Evaluation]
@@ -47,27 +48,26 @@ def evaluate_seeds(configs: Sequence[Config], part: str = "heldout") -> dict[int
     """
     for config in configs:
         _check_trained(config)
-    setup = make_setup(configs[0], part)
-    env = setup.env
+    env = load_env(configs[0], part)
     checkpoints = {config.seed: chosen_checkpoint(config, env.observation_size) for config in configs}
-    objects = [demonstration.object for demonstration in setup.demonstrations]
-    alone = without_grip(setup)
+    objects = [demonstration.object for demonstration in env.demonstrations]
+    alone = without_grip(env)
     policy = deterministic_policy(configs[0].ppo, env.observation_size, env.action_size)
     rollouts: dict[int | str, Rollouts] = {}
     with counter(len(configs) + 2, "evaluating (sets of rollouts)") as advance:
-        roll_out = make_roll_out(env, setup.hands, policy, HOLD)
+        roll_out = make_roll_out(env, policy, HOLD)
         for seed, checkpoint in checkpoints.items():
             rollouts[seed] = roll_out(checkpoint.policy)
             advance(1)
-        rollouts[ZERO] = make_roll_out(env, setup.hands, zero_residual, HOLD)(None)
+        rollouts[ZERO] = make_roll_out(env, zero_residual, HOLD)(None)
         advance(1)
-        rollouts[REPLAY] = make_roll_out(alone.env, setup.hands, zero_residual, HOLD)(None)
+        rollouts[REPLAY] = make_roll_out(alone, zero_residual, HOLD)(None)
         advance(1)
     scores = {key: evaluate(each, objects) for key, each in rollouts.items()}
     keys = {seed: {POLICY: seed, ZERO: ZERO, REPLAY: REPLAY} for seed in checkpoints}
     return {
         seed: Results(
-            setup,
+            env,
             checkpoint,
             {title: rollouts[key] for title, key in keys[seed].items()},
             {title: scores[key] for title, key in keys[seed].items()},
@@ -103,7 +103,8 @@ def _check_trained(config: Config) -> None:
     best = Path(config.out) / "best.npz"
     if not config.checkpoint and not best.is_file():
         elsewhere = "" if config.out == f"outputs/{config.name}/seed{config.seed}" else f" out={config.out}"
+        experiment = f"data.folder={config.data.folder}" if config.data.folder else f"config={config.name}"
         raise InputError(
             f"seed {config.seed} of {config.name!r}: no such checkpoint: {best}; train it first, with the options "
-            f"given here: python -m train.ppo config={config.name} seed={config.seed}{elsewhere}"
+            f"given here: python -m train.ppo {experiment} seed={config.seed}{elsewhere}"
         )

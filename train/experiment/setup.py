@@ -1,52 +1,52 @@
-"""What training, evaluation and play share: the demonstrations of an experiment, their twins, and environments."""
+"""What training, evaluation and play share: the experiment's demonstrations, its environments, and its policy."""
 
 import dataclasses
-from collections.abc import Sequence
 from pathlib import Path
 
-from envs.demonstrations.dataset import load_part, make_set
-from envs.demonstrations.twin_hands import twins
+from envs.demonstrations.dataset import make_set
+from envs.demonstrations.load_env import env_of_set
+from envs.demonstrations.load_set import is_divided
+from envs.demonstrations.set_settings import set_folder
 from envs.evaluation.evaluate import Evaluation, evaluate
 from envs.evaluation.roll_out import make_roll_out
 from envs.evaluation.rollout import Rollouts
 from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
-from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.progress import shares
-from mjx_hand.rigid.rigid_hand import RigidHand
 from train.learning.checkpoint import Checkpoint, load_checkpoint
 from train.learning.policy import deterministic_policy
 from train.settings.config import Config
 
 
-@dataclasses.dataclass(frozen=True)
-class TrackingSetup:
-    """Demonstrations, the twin's hand for each, and the environment over them."""
+def make_sets(config: Config) -> None:
+    """Make those demonstration sets of the experiment that are missing, and say so; `load_env` reads them.
 
-    demonstrations: Sequence[Demonstration]
-    hands: Sequence[RigidHand]
-    env: TrackingEnv
-
-
-def make_setup(config: Config, part: str) -> TrackingSetup:
-    """The environment over one part ("train", "heldout") of the experiment's demonstrations, made where missing.
-
-    Of all grasp types together, they stand one type after the other.
+    Raises:
+        InputError: as `envs.demonstrations.dataset.make_set`.
     """
-    demonstrations = []
     for settings in config.data.expand_types():
-        with shares() as report:
-            folder = make_set(settings, config.demonstrations, report)
-        demonstrations += load_part(folder, part)
-    hands = twins(demonstrations)
-    return TrackingSetup(demonstrations, hands, TrackingEnv(demonstrations, hands, config.engine, config.task))
+        folder = set_folder(settings, config.demonstrations)
+        if not folder.is_dir():
+            print(f"{folder} is missing: making the demonstrations", flush=True)
+            with shares() as report:
+                make_set(settings, config.demonstrations, report)
 
 
-def without_grip(setup: TrackingSetup) -> TrackingSetup:
+def load_env(config: Config, part: str) -> TrackingEnv:
+    """The environment over one part ("train", "heldout") of the experiment's demonstrations.
+
+    Raises:
+        InputError: a set that is not made, or as `TrackingEnv`.
+    """
+    if part == "heldout" and config.data.folder and not is_divided(config.data.folder):
+        print(f"{config.data.folder} holds no demonstrations out: these are the ones for training", flush=True)
+    return env_of_set(config.data, part, config.engine, config.task, config.demonstrations)
+
+
+def without_grip(env: TrackingEnv) -> TrackingEnv:
     """The same with demonstrations replayed as they are, without the forces that the reference adds."""
-    task = dataclasses.replace(setup.env.task, grip_force=0.0)
-    env = TrackingEnv(setup.demonstrations, setup.hands, setup.env.engine.name, task)
-    return dataclasses.replace(setup, env=env)
+    task = dataclasses.replace(env.task, grip_force=0.0)
+    return TrackingEnv(env.demonstrations, env.hands, env.engine.name, task)
 
 
 def chosen_checkpoint(config: Config, observation_size: int) -> Checkpoint:
@@ -65,13 +65,13 @@ def chosen_checkpoint(config: Config, observation_size: int) -> Checkpoint:
     return checkpoint
 
 
-def rolled_out(config: Config, setup: TrackingSetup) -> tuple[Checkpoint, Rollouts, Evaluation]:
+def rolled_out(config: Config, env: TrackingEnv) -> tuple[Checkpoint, Rollouts, Evaluation]:
     """The chosen policy, a rollout of each demonstration under it, and their scores.
 
     Raises:
         InputError: as `chosen_checkpoint`.
     """
-    checkpoint = chosen_checkpoint(config, setup.env.observation_size)
-    policy = deterministic_policy(config.ppo, setup.env.observation_size, setup.env.action_size)
-    rollouts = make_roll_out(setup.env, setup.hands, policy)(checkpoint.policy)
-    return checkpoint, rollouts, evaluate(rollouts, [demonstration.object for demonstration in setup.demonstrations])
+    checkpoint = chosen_checkpoint(config, env.observation_size)
+    policy = deterministic_policy(config.ppo, env.observation_size, env.action_size)
+    rollouts = make_roll_out(env, policy)(checkpoint.policy)
+    return checkpoint, rollouts, evaluate(rollouts, [demonstration.object for demonstration in env.demonstrations])

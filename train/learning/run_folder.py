@@ -11,6 +11,7 @@ from typing import Any
 from filelock import FileLock, Timeout
 from omegaconf import OmegaConf
 
+from envs.demonstrations.load_set import part_digest
 from mjx_hand.errors import InputError
 from mjx_hand.files.npz_archive import replacing
 from train.learning.training_state import load_run, save_run
@@ -28,6 +29,7 @@ _FREE = (
     "debug",
     "play",
     "checks",
+    "data.folder",
     "device",
     "ppo.num_updates",
     "ppo.num_timesteps",
@@ -43,6 +45,7 @@ _RENAMED = {
     "task.lost_at_last": "task.termination_distance_last",
     "task.mid_start": "task.random_start_prob",
     "task.ahead": "task.lookahead",
+    "task.action_cost": "task.rewards.action",
 }
 
 
@@ -67,7 +70,7 @@ def run_folder(config: Config) -> Iterator["RunFolder"]:
             _check_same(config, written)
         if is_first():
             with replacing(written) as temporary:
-                temporary.write_text(OmegaConf.to_yaml(OmegaConf.structured(config)))
+                temporary.write_text(OmegaConf.to_yaml(OmegaConf.create(_told(config))))
         yield folder
 
 
@@ -116,7 +119,7 @@ def _alone_in(path: Path) -> Iterator[None]:
 def _check_same(config: Config, written: Path) -> None:
     # An option that there was not yet when the folder was written had what is now its default.
     saved = {_RENAMED.get(name, name): value for name, value in _settings(_read(written)).items()}
-    before, now = _settings(_plain(Config())) | saved, _settings(_plain(config))
+    before, now = _settings(_told(Config())) | saved, _settings(_told(config))
     differing = [name for name in sorted(before.keys() | now.keys()) if before.get(name) != now.get(name)]
     if differing:
         name = differing[0]
@@ -127,8 +130,12 @@ def _check_same(config: Config, written: Path) -> None:
         )
 
 
-def _plain(config: Config) -> dict[str, Any]:
-    return json.loads(json.dumps(dataclasses.asdict(config)))  # lists for tuples, as the file has them
+def _told(config: Config) -> dict[str, Any]:
+    """All options as the file has them, lists for tuples, and what finished demonstrations hold, wherever they are."""
+    options = json.loads(json.dumps(dataclasses.asdict(config)))
+    if config.data.folder:
+        options["data"]["contents"] = part_digest(config.data.folder, "train")
+    return options
 
 
 def _read(path: Path) -> dict[str, Any]:

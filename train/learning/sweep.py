@@ -32,7 +32,8 @@ from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 from train.learning.interruption import left_to_others
 from train.settings.config import Config, command, compose, one_line, refuse, to_config
-from train.settings.device import use_device, with_device
+from train.settings.device import use_device
+from train.settings.overrides import completed
 
 LOG = "log.txt"
 _FLAGS = {"-m", "--multirun"}
@@ -146,7 +147,7 @@ def _launched(job: _Job, overrides: Sequence[str]) -> list[Outcome]:
             left_to_others() if elsewhere else contextlib.nullcontext(),
         ):
             running: Any = GlobalHydra.instance().hydra
-            batches = running.multirun("train", job, with_device(overrides))
+            batches = running.multirun("train", job, completed(overrides))
     except MissingConfigException as error:
         hint = "; launchers come with: pip install 'mjx-hand[sweep]'" if elsewhere else ""
         raise InputError(one_line(error) + hint) from None

@@ -69,7 +69,7 @@ VARIANTS = (
         "Its term is constant, the rotation's as before.",
         ("task.reward_position_alpha=0.001",),
     ),
-    Variant("no cost of actions", "reward", "Large residuals are free.", ("task.action_cost=0",)),
+    Variant("no cost of actions", "reward", "Large residuals are free.", ("task.rewards.action=0",)),
     Variant(
         "tightening end",
         "episodes",

@@ -27,7 +27,7 @@ def tables(results: Mapping[int, Results], config: Config) -> tuple[Table, ...]:
     Where the demonstrations are of several grasp types, then also scores by type.
     """
     first = next(iter(results.values()))
-    count = len(first.setup.demonstrations)
+    count = len(first.env.demonstrations)
     note = (
         f"{count} held-out demonstrations, every rollout counted, from frame 0, unassisted; "
         "the paper does not define its success"
@@ -46,7 +46,7 @@ def tracking_plot(results: Mapping[int, Results]) -> Figure:
     together = np.concatenate([100 * position_error(r) for r in every])
     errors = {POLICY: (together, np.concatenate([r.counted for r in every]))}
     errors |= {t: (100 * position_error(first.rollouts[t]), first.rollouts[t].counted) for t in (ZERO, REPLAY)}
-    return plots.error_over_time(first.setup.env.fps, errors, limit=3.0)
+    return plots.error_over_time(first.env.fps, errors, limit=3.0)
 
 
 def films(results: Mapping[int, Results], folder: Path) -> dict[str, Film]:
@@ -62,7 +62,7 @@ def films(results: Mapping[int, Results], folder: Path) -> dict[str, Film]:
             f"{reason or 'followed'}, {scores['tracking_error_cm'][index]:.2f} cm and "
             f"{scores['object_rotation_error_deg'][index]:.1f}° off on average."
         )
-        made[name] = film(result.setup, result.rollouts[POLICY], index, folder / f"{name}.mp4", caption)
+        made[name] = film(result.env, result.rollouts[POLICY], index, folder / f"{name}.mp4", caption)
     return made
 
 
@@ -72,7 +72,7 @@ def evaluation_page(results: Mapping[int, Results], configs: Sequence[Config], s
     policies = {seed: result.evaluations[POLICY] for seed, result in results.items()}
     baselines = {title: first.evaluations[title] for title in (ZERO, REPLAY)}
     scores, failures, *by_type = tables(results, config)
-    objects = [demonstration.object for demonstration in first.setup.demonstrations]
+    objects = [demonstration.object for demonstration in first.env.demonstrations]
     success = [100 * e.rows()["manip_trans_object"] for e in policies.values()]
     errors = [e.rows()["tracking_error_cm"] for e in policies.values()]
     paper = PAPER.get(config.data.grasp)
@@ -109,7 +109,7 @@ def evaluation_page(results: Mapping[int, Results], configs: Sequence[Config], s
             Section("Every demonstration", [demonstration_table(policies, baselines, objects)]),
         ),
         how=[
-            ("engine", first.setup.env.engine.name),
+            ("engine", first.env.engine.name),
             ("seeds", seeds),
             ("policies", ", ".join(f"{r.checkpoint.steps:,} steps (seed {seed})" for seed, r in results.items())),
             ("machine", f"{processor()}, {len(jax.devices())} {jax.default_backend()} device(s)"),
@@ -120,7 +120,7 @@ def evaluation_page(results: Mapping[int, Results], configs: Sequence[Config], s
 
 
 def _grasps(result: Results) -> list[str]:
-    return [demonstration.grasp for demonstration in result.setup.demonstrations]
+    return [demonstration.grasp for demonstration in result.env.demonstrations]
 
 
 def _between(values: Sequence[float], unit: str, digits: int) -> str:

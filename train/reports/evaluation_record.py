@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from envs.demonstrations.dataset import fingerprint, set_folder
+from envs.demonstrations.load_set import PARTS, part_digest
+from envs.demonstrations.set_settings import fingerprint, set_folder
 from envs.evaluation.evaluate import Evaluation
 from envs.grasps import grasp_names, grasp_type
 from mjx_hand.files.npz_archive import replacing
@@ -33,15 +34,15 @@ def write_results(results: Mapping[int, Results], configs: Sequence[Config], fil
     out, config, first = shared_folder(configs), configs[0], next(iter(results.values()))
     policies = {seed: result.evaluations[POLICY] for seed, result in results.items()}
     baselines = {title: e for title, e in first.evaluations.items() if title != POLICY}
-    grasps = [demonstration.grasp for demonstration in first.setup.demonstrations]
+    grasps = [demonstration.grasp for demonstration in first.env.demonstrations]
     by_type = [type_scores(e, grasps) for e in policies.values()]
     summary = {
         "schema": SCHEMA,
         "experiment": config.name,
         "grasp": config.data.grasp,
-        "engine": first.setup.env.engine.name,
+        "engine": first.env.engine.name,
         "checkpoint_steps": {seed: result.checkpoint.steps for seed, result in results.items()},
-        "demonstrations": len(first.setup.demonstrations),
+        "demonstrations": len(first.env.demonstrations),
         "scores": {POLICY: _mean([e.rows() for e in policies.values()]), **{t: e.rows() for t, e in baselines.items()}},
         "types": {
             POLICY: {grasp: _mean([scores[grasp] for scores in by_type]) for grasp in by_type[0]},
@@ -89,6 +90,8 @@ def evaluation_fingerprint(configs: Sequence[Config]) -> str:
         parts = [fingerprint(config.data)]
         parts += [dataclasses.asdict(part) for part in (config.task, config.ppo, config.checks)]
         sets = [set_folder(settings, config.demonstrations).name for settings in config.data.expand_types()]
+        if config.data.folder:
+            sets += [part_digest(config.data.folder, part) for part in PARTS]
         forces = [grasp_type(name).grip_force for name in grasp_names()]
         told = [config.name, config.engine, config.seed, sets, forces, parts]
         content.update(json.dumps(told, sort_keys=True).encode())

@@ -12,14 +12,15 @@ from hydra.errors import HydraException
 from omegaconf import DictConfig, ListConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from envs.demonstrations.dataset import SetSettings
+from envs.demonstrations.set_settings import SetSettings
 from envs.physics import ENGINES
 from envs.settings import from_dict
 from envs.task import Task
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
-from train.settings.device import DEVICES, use_device, with_device
+from train.settings.device import DEVICES, use_device
 from train.settings.options import Checks, Debug, Distributed, Play, Ppo
+from train.settings.overrides import completed
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,9 +34,9 @@ class Config:
         seed: of networks, resets and actions.
         seeds: for commands that take several seeds of one experiment; empty for `seed` alone.
         out: folder for checkpoints, logs and results.
-        demonstrations: folder below which demonstration sets are kept, and made where missing.
+        demonstrations: folder below which demonstration sets are kept.
         checkpoint: what to evaluate or play; empty for the best of `out`.
-        data: which demonstrations.
+        data: which demonstrations; `data.folder=PATH` alone for finished ones.
         task: what an episode is.
         ppo: how to learn.
         checks: evaluation while training.
@@ -89,7 +90,7 @@ def compose_seeds(overrides: Sequence[str] = ()) -> list[Config]:
 
 def _composed(overrides: Sequence[str]) -> DictConfig:
     _store_schema()
-    overrides = with_device(overrides)
+    overrides = completed(overrides)
     try:
         with hydra.initialize_config_module("configs", version_base=None):
             base = hydra.compose("train", [o for o in overrides if o.startswith(("config=", "device="))])
@@ -168,7 +169,7 @@ def _command(task: Callable[[DictConfig], object]) -> None:
         except InputError as error:
             refuse(error)
     try:
-        sys.argv[1:] = with_device(arguments)
+        sys.argv[1:] = completed(arguments)
     except InputError as error:
         refuse(error)
     hydra.main(version_base=None, config_path="pkg://configs", config_name="train")(job)()

@@ -3,38 +3,38 @@
 import numpy as np
 
 from envs.scene import NUM_WRIST
+from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.pytree import replace
 from mjx_hand.view.browser.hand_scene import object_layers, twin_layer
 from mjx_hand.view.browser.scene import Curve, Scene
-from train.experiment.setup import TrackingSetup
 from train.learning.unstable import Unstable, step_again
 from train.view.play_scene import ghost, posed
 
 _NUM_TARGETS = NUM_WRIST + NUM_HINGES
 
 
-def unstable_scene(unstable: Unstable, setup: TrackingSetup, name: str) -> Scene:
+def unstable_scene(unstable: Unstable, env: TrackingEnv, name: str) -> Scene:
     """The state before the step, then one frame a physics step, with the commanded pose as a grey ghost.
 
     Targets that are no numbers are drawn where the hand was.
 
     Args:
         unstable: the step.
-        world: demonstrations that the training had.
+        env: over the demonstrations that the training had.
         name: of the experiment.
 
     Raises:
         InputError: they are not those that the simulation followed.
     """
-    engine, k = setup.env.engine, unstable.demonstration
-    if not 0 <= k < len(setup.demonstrations) or len(unstable.qpos) != engine.models[0].nq:
+    engine, k = env.engine, unstable.demonstration
+    if not 0 <= k < len(env.demonstrations) or len(unstable.qpos) != engine.models[0].nq:
         raise InputError(
             f"play.unstable follows demonstration {k} in {len(unstable.qpos)} coordinates; {name!r} has "
-            f"{len(setup.demonstrations)} of {engine.models[0].nq}: give the config and data it was trained with"
+            f"{len(env.demonstrations)} of {engine.models[0].nq}: give the config and data it was trained with"
         )
-    demonstration, hand = setup.demonstrations[k], setup.hands[k]
+    demonstration, hand = env.demonstrations[k], env.hands[k]
     fps = float(1 / engine.models[k].opt.timestep)
     path = step_again(engine.models[k], unstable, engine.substeps)
     motion = posed(demonstration, path, fps)

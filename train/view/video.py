@@ -6,34 +6,34 @@ import numpy as np
 
 from envs.evaluation.rollout import Rollouts
 from envs.scene import demonstration_model
+from envs.tracking import TrackingEnv
 from mjx_hand.view.report import Film
 from mjx_hand.view.video.renderer import RendererUnavailable
 from mjx_hand.view.video.video import beside, render_frames, write_video
-from train.experiment.setup import TrackingSetup
 
 _RATE = 25.0  # frames a second
 
 
-def film(setup: TrackingSetup, rollouts: Rollouts, index: int, path: Path, caption: str) -> Film:
+def film(env: TrackingEnv, rollouts: Rollouts, index: int, path: Path, caption: str) -> Film:
     """The video of rollout `index` for a page; where this machine cannot render, the reason."""
     try:
-        side_by_side(setup, rollouts, index, path)
+        side_by_side(env, rollouts, index, path)
     except RendererUnavailable as error:
         return Film(None, caption, str(error))
     return Film(path, caption)
 
 
-def side_by_side(setup: TrackingSetup, rollouts: Rollouts, index: int, path: str | Path) -> None:
+def side_by_side(env: TrackingEnv, rollouts: Rollouts, index: int, path: str | Path) -> None:
     """Write an MP4 of rollout `index`: left what was demonstrated, right what the twin did.
 
     Raises:
         RendererUnavailable: this machine cannot render.
     """
     which = int(rollouts.demonstration[index])
-    demonstration = setup.demonstrations[which]
-    model = demonstration_model(demonstration, setup.hands[which], visual=True)
+    demonstration = env.demonstrations[which]
+    model = demonstration_model(demonstration, env.hands[which], visual=True)
     frames = np.flatnonzero(rollouts.counted[index])[:: max(round(rollouts.fps / _RATE), 1)]
-    targets = np.asarray(setup.env.reference.targets)[which]
+    targets = np.asarray(env.reference.targets)[which]
     wanted = np.concatenate([targets[frames], rollouts.object_reference[index, frames]], axis=1)
     done = rollouts.qpos[index, frames]
     size = (480, 480)

@@ -7,8 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from envs.demonstrations import dataset
-from envs.demonstrations.dataset import PARTS, SetSettings, load_part, make_set, set_folder
+from envs.demonstrations.dataset import make_set
+from envs.demonstrations.load_set import PARTS, load_part
 from envs.demonstrations.scripted.simulated_capture import CaptureSettings, load_truth
+from envs.demonstrations.set_settings import SetSettings, set_folder
 from envs.demonstrations.twin_hands import twins
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import load_demonstration, save_demonstration

@@ -7,9 +7,11 @@ from PIL import Image
 
 from envs.demonstrations import dataset
 from envs.demonstrations.__main__ import main, settings_of
-from envs.demonstrations.dataset import PARTS, YIELD, SetSettings, set_folder
+from envs.demonstrations.dataset import YIELD
+from envs.demonstrations.load_set import PARTS
 from envs.demonstrations.quality import check_part
 from envs.demonstrations.scripted.simulated_capture import load_truth, save_truth
+from envs.demonstrations.set_settings import SetSettings, set_folder
 from envs.grasps import grasp_type
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import load_demonstration, save_demonstration

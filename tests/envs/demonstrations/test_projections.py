@@ -10,8 +10,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from envs.demonstrations import dataset
-from envs.demonstrations.dataset import PARTS, SetSettings, fingerprint, load_part, make_set, set_folder
+from envs.demonstrations.dataset import make_set
+from envs.demonstrations.load_set import PARTS, load_part
 from envs.demonstrations.scripted.simulated_capture import CaptureSettings
+from envs.demonstrations.set_settings import SetSettings, fingerprint, set_folder
 from envs.demonstrations.twin_hands import twins
 from envs.tracking import TrackingEnv, twin_of
 from mjx_hand.errors import InputError

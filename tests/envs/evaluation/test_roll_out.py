@@ -12,7 +12,7 @@ HOLD = 1.0
 
 @pytest.fixture(scope="module")
 def rollouts(env, hands):
-    return make_roll_out(env, hands, zero_residual, hold=HOLD)(None)
+    return make_roll_out(env, zero_residual, hold=HOLD)(None)
 
 
 def test_masks_count_the_demonstration_and_then_the_hold(env, rollouts):
@@ -32,7 +32,7 @@ def test_nothing_ends_a_rollout_early(env, hands):
     def push(parameters, observation):
         return jnp.ones((observation.shape[0], 26))
 
-    thrown = make_roll_out(env, hands, push)(None)
+    thrown = make_roll_out(env, push)(None)
     error = np.linalg.norm(thrown.object_pose[..., :3] - thrown.object_reference[..., :3], axis=-1)
     length = np.asarray(env.reference.length)
     for k, n in enumerate(length):

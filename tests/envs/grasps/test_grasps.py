@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -6,6 +8,11 @@ from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import HINGES, LINKS
 from mjx_hand.objects.description import OBJECT_KINDS
 from mjx_hand.rigid.limits import anatomical_limits
+
+
+def test_a_mesh_is_no_grasp_types_object():
+    with pytest.raises(InputError, match=r"'pinch': object_kind is 'mesh', .*valid: box, sphere, cylinder, capsule"):
+        dataclasses.replace(grasp_type("pinch"), object_kind="mesh")
 
 
 @pytest.mark.parametrize("name", grasp_names())

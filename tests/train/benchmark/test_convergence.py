@@ -4,9 +4,8 @@ import numpy as np
 
 from train.benchmark import convergence
 from train.benchmark.__main__ import main
-from train.benchmark.engines import config
+from train.benchmark.engines import small_env
 from train.benchmark.solver import CHOSEN
-from train.experiment.setup import make_setup
 
 
 def test_more_sweeps_end_nearer_to_the_solution(demonstrations, tmp_path, capsys, monkeypatch):
@@ -26,7 +25,7 @@ def test_more_sweeps_end_nearer_to_the_solution(demonstrations, tmp_path, capsys
 
 
 def test_moments_are_states_under_way_and_their_targets_jump(demonstrations):
-    env = make_setup(config("native", "pinch", demonstrations), "train").env
+    env = small_env("native", "pinch", demonstrations)
     state, controls = convergence.moments(env, 3)
     assert controls.shape == (12, 26)
     # Four control steps of three worlds: each goes on from where the one before led.

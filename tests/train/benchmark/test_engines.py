@@ -14,14 +14,13 @@ from train.benchmark.__main__ import main
 from train.benchmark.contestants import Contestant
 from train.benchmark.memory import fitting, with_memory
 from train.benchmark.timing import rates
-from train.experiment.setup import make_setup
 
 TINY = ("--grasps", "pinch", "--engines", "native", "--worlds", "1", "2", "--runs", "2", "--seconds", "0.01")
 
 
 @pytest.fixture(scope="module")
-def setup(demonstrations):
-    return make_setup(engines.config("native", "pinch", demonstrations), "train")
+def env(demonstrations):
+    return engines.small_env("native", "pinch", demonstrations)
 
 
 def tables(text: str) -> list[list[list[str]]]:
@@ -113,13 +112,13 @@ def test_memory_is_the_peak_while_a_contestant_is_made_and_run():
     assert 35 * 2**20 < memory.host < 80 * 2**20
 
 
-def test_engine_alone_and_mujocos_own_ways_reach_the_same_states(setup):
-    alone = contestants.physics(setup.env, 2).advance(contestants.PASS)
-    rolled = contestants.open_rollout(setup.env, 2, threads=2).advance(contestants.PASS)
+def test_engine_alone_and_mujocos_own_ways_reach_the_same_states(env):
+    alone = contestants.physics(env, 2).advance(contestants.PASS)
+    rolled = contestants.open_rollout(env, 2, threads=2).advance(contestants.PASS)
     np.testing.assert_allclose(alone, rolled, atol=1e-5)
     assert np.ptp(rolled, axis=0).max() > 1e-3  # worlds start apart
-    looped = contestants.step_loop(setup.env).advance(contestants.PASS)
-    single = contestants.open_rollout(setup.env, 1, threads=1).advance(contestants.PASS)
+    looped = contestants.step_loop(env).advance(contestants.PASS)
+    single = contestants.open_rollout(env, 1, threads=1).advance(contestants.PASS)
     np.testing.assert_allclose(looped, single, atol=1e-6)
 
 

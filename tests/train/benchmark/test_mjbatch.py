@@ -13,24 +13,23 @@ from mjx_hand.errors import InputError
 from train.benchmark import entrants, mjbatch, mjbatch_worker
 from train.benchmark.__main__ import main
 from train.benchmark.contestants import PASS
-from train.benchmark.engines import config
+from train.benchmark.engines import small_env
 from train.benchmark.exchange import make_start, numbers, scene_xml, write_scene, write_script
 from train.benchmark.mjbatch_process import MjbatchProcess
 from train.benchmark.mjbatch_report import Results, Row, text
-from train.experiment.setup import make_setup
 
 PYTHON = os.environ.get("MJX_HAND_MJBATCH_PYTHON")
 TINY = ("--worlds", "1", "3", "--rounds", "2", "--seconds", "0.01", "--threads", "2")
 
 
 @pytest.fixture(scope="module")
-def setup(demonstrations):
-    return make_setup(config("native", "pinch", demonstrations), "train")
+def env(demonstrations):
+    return small_env("native", "pinch", demonstrations)
 
 
-def test_a_model_comes_out_of_the_files_as_it_went_in(setup, tmp_path):
-    wanted = solver.gauss_seidel(setup.env.models)
-    write_scene(tmp_path, setup, {"some": wanted})
+def test_a_model_comes_out_of_the_files_as_it_went_in(env, tmp_path):
+    wanted = solver.gauss_seidel(env.models)
+    write_scene(tmp_path, env, {"some": wanted})
     with np.load(tmp_path / "some.npz") as kept:
         fields = dict(kept)
     model, varying, _, unknown = mjbatch_worker.load_model(str(tmp_path / "scene.xml"), fields)
@@ -49,9 +48,9 @@ def test_a_model_comes_out_of_the_files_as_it_went_in(setup, tmp_path):
     assert (model.opt.cone, model.opt.timestep) == (mujoco.mjtCone.mjCONE_ELLIPTIC, 0.004)
 
 
-def test_what_another_mujoco_compiles_otherwise_or_does_not_know_is_named(setup, tmp_path):
-    (tmp_path / "scene.xml").write_text(scene_xml(setup))
-    fields = numbers(setup.env.models)
+def test_what_another_mujoco_compiles_otherwise_or_does_not_know_is_named(env, tmp_path):
+    (tmp_path / "scene.xml").write_text(scene_xml(env))
+    fields = numbers(env.models)
     fields["body_mass"] = 2 * fields["body_mass"]
     fields["body_charm"] = np.ones((2, 3))
     model, _, otherwise, unknown = mjbatch_worker.load_model(str(tmp_path / "scene.xml"), fields)
@@ -64,18 +63,18 @@ def test_what_another_mujoco_compiles_otherwise_or_does_not_know_is_named(setup,
         mjbatch_worker.load_model(str(tmp_path / "scene.xml"), fields)
 
 
-def test_bounding_volumes_hold_those_of_all_models(setup):
-    covering = numbers(setup.env.models)["bvh_aabb"]
-    for model, found in zip(setup.env.models, covering, strict=True):
+def test_bounding_volumes_hold_those_of_all_models(env):
+    covering = numbers(env.models)["bvh_aabb"]
+    for model, found in zip(env.models, covering, strict=True):
         np.testing.assert_array_equal(found, covering[0])
         corner = model.bvh_aabb[:, :3] + model.bvh_aabb[:, 3:]
         assert (corner <= found[:, :3] + found[:, 3:] + 1e-12).all()
         assert (model.bvh_aabb[:, :3] - model.bvh_aabb[:, 3:] >= found[:, :3] - found[:, 3:] - 1e-12).all()
 
 
-def test_native_and_mujocos_batch_end_at_the_same_bits(setup):
-    start = make_start(setup, 3)
-    engine = NativeEngine(solver.newton(setup.env.models), setup.env.engine.substeps, threads=2)
+def test_native_and_mujocos_batch_end_at_the_same_bits(env):
+    start = make_start(env, 3)
+    engine = NativeEngine(solver.newton(env.models), env.engine.substeps, threads=2)
     ends = [
         entrants.native(engine, start).end(),
         *(entrants.mujoco_batch(engine, start, 2, current).end() for current in (True, False)),
@@ -136,11 +135,11 @@ def test_bad_options_end_in_one_line_and_status_2(options, message, capsys):
 
 
 @pytest.mark.skipif(PYTHON is None, reason="MJX_HAND_MJBATCH_PYTHON names no interpreter that mjbatch is installed for")
-def test_mjbatch_ends_where_native_ends(setup, tmp_path):
-    models = {name: setting(setup.env.models) for name, setting in mjbatch._SETTINGS.items()}
-    write_scene(tmp_path, setup, models)
-    start = make_start(setup, 6)
-    write_script(tmp_path / "script.npz", start, setup.env.engine.substeps)
+def test_mjbatch_ends_where_native_ends(env, tmp_path):
+    models = {name: setting(env.models) for name, setting in mjbatch._SETTINGS.items()}
+    write_scene(tmp_path, env, models)
+    start = make_start(env, 6)
+    write_script(tmp_path / "script.npz", start, env.engine.substeps)
     with MjbatchProcess(Path(str(PYTHON)), tmp_path) as process:
         assert set(process.versions) == {"mjbatch", "mujoco"}
         for name in models:
@@ -149,7 +148,7 @@ def test_mjbatch_ends_where_native_ends(setup, tmp_path):
             assert set(otherwise) <= {"site_size"}  # of pictures alone
             assert set(unknown) <= {"jnt_springyield"}
             theirs = entrants.mjbatch(process.ask, name, start, current=True)
-            ours = entrants.native(NativeEngine(models[name], setup.env.engine.substeps, threads=2), start)
+            ours = entrants.native(NativeEngine(models[name], env.engine.substeps, threads=2), start)
             np.testing.assert_allclose(theirs.end(), ours.end(), atol=1e-5)
             assert min(theirs.run(PASS)) > 0
         with pytest.raises(InputError, match="stopped: FileNotFoundError"):

@@ -9,7 +9,7 @@ from envs.evaluation.evaluate import evaluate
 from envs.evaluation.roll_out import make_roll_out, zero_residual
 from mjx_hand.errors import InputError
 from tools import bundle_policy
-from train.experiment.bundled_policies import bundled_policy, bundled_setup
+from train.experiment.bundled_policies import bundled_env, bundled_policy
 from train.experiment.setup import chosen_checkpoint
 from train.learning.checkpoint import load_checkpoint
 from train.learning.curve import Point
@@ -56,12 +56,12 @@ def test_the_policies_that_come_along_do_what_the_zero_residual_does_not(name: s
     """On the demonstration beside each, from frame 0, and still there five seconds later."""
     config = compose([f"config={name}", "engine=native"])
     config = dataclasses.replace(config, checkpoint=str(bundled_policy(name)))
-    setup = bundled_setup(config)
-    checkpoint = chosen_checkpoint(config, setup.env.observation_size)
-    policy = deterministic_policy(config.ppo, setup.env.observation_size, setup.env.action_size)
-    objects = [d.object for d in setup.demonstrations]
-    scores = evaluate(make_roll_out(setup.env, setup.hands, policy, 5.0)(checkpoint.policy), objects).rows()
+    env = bundled_env(config)
+    checkpoint = chosen_checkpoint(config, env.observation_size)
+    policy = deterministic_policy(config.ppo, env.observation_size, env.action_size)
+    objects = [d.object for d in env.demonstrations]
+    scores = evaluate(make_roll_out(env, policy, 5.0)(checkpoint.policy), objects).rows()
     assert scores["manip_trans_object"] == scores["hold"] == 1
     assert scores["tracking_error_cm"] < 0.5
-    idle = evaluate(make_roll_out(setup.env, setup.hands, zero_residual)(None), objects).rows()
+    idle = evaluate(make_roll_out(env, zero_residual)(None), objects).rows()
     assert idle["tracking_error_cm"] > 2 * scores["tracking_error_cm"]

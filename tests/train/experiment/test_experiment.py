@@ -7,16 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import train.experiment.setup
 import train.ppo
-from envs.demonstrations.dataset import SetSettings, load_part, set_folder
+from envs.demonstrations import load_set
+from envs.demonstrations.load_set import load_part
+from envs.demonstrations.set_settings import SetSettings, set_folder
 from envs.grasps import grasp_names, grasp_type
+from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from mjx_hand.pytree import replace
 from mjx_hand.view.browser.viewer import Viewer
 from train.evaluate import evaluate_and_write
 from train.experiment.evaluate_seeds import POLICY, REPLAY, ZERO
-from train.experiment.setup import TrackingSetup, make_setup, without_grip
+from train.experiment.setup import load_env, without_grip
 from train.play import viewer
 from train.reports.evaluation_record import evaluation_fingerprint
 from train.settings.config import Config, compose
@@ -36,7 +38,7 @@ def test_it_uses_the_very_sets_of_the_single_types(tmp_path):
 def test_the_force_of_a_grip_makes_no_other_demonstrations_and_another_evaluation(monkeypatch, tiny: Config):
     folder, digest = set_folder(tiny.data, "sets"), evaluation_fingerprint([tiny])
     harder = dataclasses.replace(grasp_type("pinch"), grip_force=99.0)
-    for module in ("envs.demonstrations.dataset", "train.reports.evaluation_record"):
+    for module in ("envs.demonstrations.set_settings", "train.reports.evaluation_record"):
         monkeypatch.setattr(f"{module}.grasp_type", lambda name: harder if name == "pinch" else grasp_type(name))
     assert set_folder(tiny.data, "sets") == folder
     assert evaluation_fingerprint([tiny]) != digest
@@ -56,17 +58,15 @@ def test_the_types_stand_one_after_the_other(monkeypatch, tiny: Config, everythi
         assert path == folder
         return [replace(d, grasp=asked[-1].grasp) for d in load_part(path, part)]
 
-    monkeypatch.setattr(
-        train.experiment.setup, "make_set", lambda settings, root, report: asked.append(settings) or folder
-    )
-    monkeypatch.setattr(train.experiment.setup, "load_part", part_of_type)
-    setup = make_setup(everything, "train")
+    monkeypatch.setattr(load_set, "set_folder", lambda settings, root: asked.append(settings) or folder)
+    monkeypatch.setattr(load_set, "load_part", part_of_type)
+    env = load_env(everything, "train")
     assert asked == [dataclasses.replace(tiny.data, grasp=name) for name in grasp_names()]
-    assert [d.grasp for d in setup.demonstrations] == grasp_names()
-    grip, forces = np.asarray(setup.env.reference.grip), [grasp_type(name).grip_force for name in grasp_names()]
+    assert [d.grasp for d in env.demonstrations] == grasp_names()
+    grip, forces = np.asarray(env.reference.grip), [grasp_type(name).grip_force for name in grasp_names()]
     for row, force in zip(grip, forces, strict=True):
         assert np.allclose(row, grip[0]) == (force == forces[0])
-    assert not np.asarray(without_grip(setup).env.reference.grip).any()
+    assert not np.asarray(without_grip(env).reference.grip).any()
 
 
 def test_one_set_is_never_of_all_types(everything: Config, tmp_path):
@@ -77,13 +77,13 @@ def test_one_set_is_never_of_all_types(everything: Config, tmp_path):
 @pytest.mark.slow
 def test_all_types_are_made_trained_evaluated_and_played(everything: Config, tmp_path, monkeypatch):
     config = dataclasses.replace(everything, out=str(tmp_path / "out"), play=Play(port=0))
-    setup: TrackingSetup = make_setup(config, "train")
-    kinds = {d.object.kind for d in setup.demonstrations}
+    env: TrackingEnv = load_env(config, "train")
+    kinds = {d.object.kind for d in env.demonstrations}
     assert kinds == {grasp_type(name).object_kind for name in grasp_names()}
-    points = train.ppo.train(config, setup)
+    points = train.ppo.train(config, env)
     assert points[-1].steps >= config.ppo.budget * config.ppo.steps_per_update
 
-    monkeypatch.setattr(video, "side_by_side", lambda setup, rollouts, index, path: Path(path).write_bytes(b"film"))
+    monkeypatch.setattr(video, "side_by_side", lambda env, rollouts, index, path: Path(path).write_bytes(b"film"))
     folder, (_, _, by_type) = evaluate_and_write([config])
     assert [row[0] for row in by_type.rows] == [*grasp_names(), "mean over the types"]
     assert list(by_type.columns) == ["", POLICY, ZERO, REPLAY, "paper, its own count"]

@@ -11,14 +11,13 @@ from envs.parallel import ParallelEnv
 from envs.tracking import TrackingEnv, twin_of
 from mjx_hand.errors import InputError
 from mjx_hand.pytree import replace
-from train.experiment.setup import TrackingSetup
 from train.learning.learner import Learner
 from train.settings.config import Config
 
 
 @pytest.fixture(scope="module")
-def learner(tiny: Config, setup: TrackingSetup) -> Learner:
-    return Learner(ParallelEnv(setup.env), tiny.ppo)
+def learner(tiny: Config, env: TrackingEnv) -> Learner:
+    return Learner(ParallelEnv(env), tiny.ppo)
 
 
 def different(a: Any, b: Any) -> list[str]:
@@ -46,9 +45,9 @@ def test_an_update_changes_networks_moments_worlds_and_key(learner: Learner):
 
 
 @pytest.fixture(scope="module")
-def other(tiny: Config, setup: TrackingSetup) -> ParallelEnv:
+def other(tiny: Config, env: TrackingEnv) -> ParallelEnv:
     """Another set of the same size: the same demonstration with a lighter object that stands elsewhere."""
-    (demonstration,) = setup.demonstrations
+    (demonstration,) = env.demonstrations
     thing = replace(demonstration.object, mass=0.5 * demonstration.object.mass)
     shift = np.array([0.01, 0.0, 0.0])
     moved = replace(
@@ -58,7 +57,7 @@ def other(tiny: Config, setup: TrackingSetup) -> ParallelEnv:
         support_position=demonstration.support_position + shift,
         motion=replace(demonstration.motion, wrist_position=demonstration.motion.wrist_position + shift),
     )
-    return ParallelEnv(TrackingEnv([moved], setup.hands, setup.env.engine.name, setup.env.task))
+    return ParallelEnv(TrackingEnv([moved], env.hands, env.engine.name, env.task))
 
 
 def test_another_set_of_the_same_size_does_not_compile_again(learner: Learner, other: ParallelEnv, tiny: Config):
@@ -86,20 +85,20 @@ def test_another_set_of_the_same_size_does_not_compile_again(learner: Learner, o
     assert learner.lowered.as_text() == second.lowered.as_text()
 
 
-def test_tables_of_another_size_are_refused(learner: Learner, setup: TrackingSetup):
-    two = ParallelEnv(TrackingEnv(2 * list(setup.demonstrations), 2 * list(setup.hands), "native", setup.env.task))
+def test_tables_of_another_size_are_refused(learner: Learner, env: TrackingEnv):
+    two = ParallelEnv(TrackingEnv(2 * list(env.demonstrations), 2 * list(env.hands), "native", env.task))
     tables = learner.placed_tables(two.env.tables)
     with pytest.raises(InputError, match=r"tables of 2 demonstrations x .* do not fit a learner for 1 dem"):
         learner.update(learner.initial(0), 0.0, tables)
 
 
-def test_memory_grows_with_the_worlds(tiny: Config, learner: Learner, setup: TrackingSetup):
+def test_memory_grows_with_the_worlds(tiny: Config, learner: Learner, env: TrackingEnv):
     """A world more needs what its unroll holds, at least: observations of each step."""
-    twice = Learner(ParallelEnv(setup.env), dataclasses.replace(tiny.ppo, num_envs=2 * tiny.ppo.num_envs))
+    twice = Learner(ParallelEnv(env), dataclasses.replace(tiny.ppo, num_envs=2 * tiny.ppo.num_envs))
     few, many = learner.memory(), twice.memory()
     assert few is not None
     assert many is not None
-    observations = tiny.ppo.num_envs * tiny.ppo.unroll_length * setup.env.observation_size * 4
+    observations = tiny.ppo.num_envs * tiny.ppo.unroll_length * env.observation_size * 4
     assert many - few > observations
 
 
@@ -111,8 +110,8 @@ def test_a_state_that_was_put_away_goes_on_as_if_it_had_not_been(learner: Learne
     assert different(on, back) == []
 
 
-def test_diverged_simulations_are_counted(tiny: Config, setup: TrackingSetup):
-    learner = Learner(ParallelEnv(setup.env), tiny.ppo)
+def test_diverged_simulations_are_counted(tiny: Config, env: TrackingEnv):
+    learner = Learner(ParallelEnv(env), tiny.ppo)
     state = learner.initial(0)
     twin = twin_of(state.worlds)
     lost = replace(twin, residual=twin.residual.at[1, 7].set(jnp.nan))  # a finger is told to go nowhere
@@ -122,11 +121,11 @@ def test_diverged_simulations_are_counted(tiny: Config, setup: TrackingSetup):
     assert float(metrics["episode/ended"]) >= 1
 
 
-def test_worlds_that_cannot_be_shared_are_refused(tiny: Config, setup: TrackingSetup):
+def test_worlds_that_cannot_be_shared_are_refused(tiny: Config, env: TrackingEnv):
     odd = dataclasses.replace(tiny.ppo)
     object.__setattr__(odd, "num_envs", 5)  # what the configuration itself would refuse, but for one device
     with pytest.raises(InputError, match=r"ppo.num_envs is 5, which 1 devices cannot share .* multiple of 2"):
-        Learner(ParallelEnv(setup.env), odd)
+        Learner(ParallelEnv(env), odd)
 
 
 def host_calls(program: str | None) -> list[str]:
@@ -141,8 +140,8 @@ def host_calls(program: str | None) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def on_mjx(tiny: Config, setup: TrackingSetup) -> Learner:
-    return Learner(ParallelEnv(TrackingEnv(setup.demonstrations, setup.hands, "mjx", setup.env.task)), tiny.ppo)
+def on_mjx(tiny: Config, env: TrackingEnv) -> Learner:
+    return Learner(ParallelEnv(TrackingEnv(env.demonstrations, env.hands, "mjx", env.task)), tiny.ppo)
 
 
 def test_nothing_goes_to_the_host_inside_an_update(on_mjx: Learner, learner: Learner):

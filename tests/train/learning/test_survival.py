@@ -12,11 +12,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from omegaconf import OmegaConf
 
 import train.ppo
+from envs.rewards import RewardWeights
+from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from tests.train.commands import arguments
-from train.experiment.setup import TrackingSetup
 from train.learning.curve import Point
 from train.learning.interruption import interruptions
 from train.ppo import train as run
@@ -46,24 +48,24 @@ def same_results(one: Path, other: Path) -> None:
     assert scores[0] == scores[1]
 
 
-def test_a_training_in_two_parts_is_the_training(trained: Trained, tiny: Config, setup: TrackingSetup, tmp_path):
+def test_a_training_in_two_parts_is_the_training(trained: Trained, tiny: Config, env: TrackingEnv, tmp_path):
     out, points = trained
-    assert [p.steps for p in run(in_folder(shortened(tiny, 32), tmp_path), setup)] == [0, 32]
-    again = run(in_folder(tiny, tmp_path), setup)
+    assert [p.steps for p in run(in_folder(shortened(tiny, 32), tmp_path), env)] == [0, 32]
+    again = run(in_folder(tiny, tmp_path), env)
     assert [p.steps for p in again] == [p.steps for p in points]
     same_results(out, tmp_path)
 
 
-def test_a_finished_training_says_so(trained: Trained, tiny: Config, setup: TrackingSetup, capsys):
+def test_a_finished_training_says_so(trained: Trained, tiny: Config, env: TrackingEnv, capsys):
     out, points = trained
     before = (out / "last.npz").stat().st_mtime_ns
-    assert [p.steps for p in run(tiny, setup)] == [p.steps for p in points]
+    assert [p.steps for p in run(tiny, env)] == [p.steps for p in points]
     assert "is trained already" in capsys.readouterr().out
     assert (out / "last.npz").stat().st_mtime_ns == before
 
 
 def test_a_signal_stops_between_updates_and_the_rest_follows(
-    trained: Trained, tiny: Config, setup: TrackingSetup, tmp_path, monkeypatch, capsys
+    trained: Trained, tiny: Config, env: TrackingEnv, tmp_path, monkeypatch, capsys
 ):
     @contextlib.contextmanager
     def after_the_first_update() -> Iterator[Callable[[], int]]:
@@ -74,10 +76,10 @@ def test_a_signal_stops_between_updates_and_the_rest_follows(
     with monkeypatch.context() as patched:
         patched.setattr(train.ppo, "interruptions", after_the_first_update)
         with pytest.raises(SystemExit) as stop:
-            run(config, setup)
+            run(config, env)
     assert stop.value.code == 128 + signal.SIGTERM
     assert "stopped at 32 steps and saved" in capsys.readouterr().out
-    assert [p.steps for p in run(config, setup)] == [0, 64]
+    assert [p.steps for p in run(config, env)] == [0, 64]
     with np.load(trained[0] / "last.npz") as first, np.load(tmp_path / "last.npz") as second:
         for key in first:
             np.testing.assert_array_equal(second[key], first[key])
@@ -94,16 +96,16 @@ def test_signals_are_remembered_and_the_handlers_put_back():
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
 
 
-def test_other_settings_do_not_go_on_but_start_anew_if_told(tiny: Config, setup: TrackingSetup, tmp_path):
+def test_other_settings_do_not_go_on_but_start_anew_if_told(tiny: Config, env: TrackingEnv, tmp_path):
     short = shortened(in_folder(tiny, tmp_path), 32)
-    run(short, setup)
+    run(short, env)
     with pytest.raises(InputError, match=r"holds a training with seed=0, now 1; choose another .* fresh=true"):
-        run(dataclasses.replace(short, seed=1), setup)
-    anew = run(dataclasses.replace(short, seed=1, fresh=True), setup)
+        run(dataclasses.replace(short, seed=1), env)
+    anew = run(dataclasses.replace(short, seed=1, fresh=True), env)
     assert [p.steps for p in anew] == [0, 32]
 
 
-def test_a_second_training_is_kept_out_and_a_killed_one_keeps_nobody_out(tiny: Config, setup: TrackingSetup, tmp_path):
+def test_a_second_training_is_kept_out_and_a_killed_one_keeps_nobody_out(tiny: Config, env: TrackingEnv, tmp_path):
     config = shortened(in_folder(tiny, tmp_path), 32)
     code = "import sys, time, filelock; lock = filelock.FileLock(sys.argv[1]); lock.acquire(); print('has it')"
     command = [sys.executable, "-uc", f"{code}; time.sleep(60)", str(tmp_path / "lock")]
@@ -114,25 +116,25 @@ def test_a_second_training_is_kept_out_and_a_killed_one_keeps_nobody_out(tiny: C
             assert other.stdout.readline() == "has it\n"
             for fresh in (False, True):
                 with pytest.raises(InputError, match=r"another training is under way in .*stop it.*out=FOLDER"):
-                    run(dataclasses.replace(config, fresh=fresh), setup)
+                    run(dataclasses.replace(config, fresh=fresh), env)
             assert [path.name for path in tmp_path.iterdir()] == ["lock"]
         finally:
             other.kill()
-    assert [p.steps for p in run(config, setup)] == [0, 32]
+    assert [p.steps for p in run(config, env)] == [0, 32]
 
 
 def test_a_damaged_state_is_named_and_the_one_before_used(
-    trained: Trained, tiny: Config, setup: TrackingSetup, tmp_path, capsys
+    trained: Trained, tiny: Config, env: TrackingEnv, tmp_path, capsys
 ):
     config = in_folder(tiny, tmp_path)
-    run(config, setup)
+    run(config, env)
     states = sorted((tmp_path / "state").iterdir())
     assert [path.name for path in states] == ["000000000000.npz", "000000000032.npz", "000000000064.npz"]
     content = bytearray(states[-1].read_bytes())
     content[len(content) // 2] ^= 1
     states[-1].write_bytes(content)
     capsys.readouterr()
-    run(config, setup)
+    run(config, env)
     said = capsys.readouterr().out
     assert "damaged, so the state before it is used" in said
     assert "going on from 32 steps" in said
@@ -140,7 +142,7 @@ def test_a_damaged_state_is_named_and_the_one_before_used(
     for path in states:
         path.write_bytes(b"")
     with pytest.raises(InputError, match=r"no sound state in .*; train anew with fresh=true"):
-        run(config, setup)
+        run(config, env)
 
 
 def test_killed_at_once_it_goes_on(trained: Trained, tiny: Config, tmp_path):
@@ -163,13 +165,17 @@ def test_killed_at_once_it_goes_on(trained: Trained, tiny: Config, tmp_path):
     same_results(trained[0], tmp_path)
 
 
-def test_a_folder_from_when_options_had_other_names_is_gone_on_with(tiny: Config, setup: TrackingSetup, tmp_path):
+def test_a_folder_from_when_options_had_other_names_is_gone_on_with(tiny: Config, env: TrackingEnv, tmp_path):
     config = in_folder(tiny, tmp_path)
-    run(shortened(config, 32), setup)
+    run(shortened(config, 32), env)
     written = tmp_path / "config.yaml"
-    text = written.read_text()
-    assert "\n  termination_distance: " in text
-    written.write_text(
-        text.replace("  termination_distance:", "  lost_at:").replace("  residual_scale_fingers:", "  finger:")
-    )
-    assert [p.steps for p in run(config, setup)] == [0, 32, 64]
+    settings = OmegaConf.load(written)
+    rewards = settings.task.pop("rewards")
+    settings.task.action_cost = rewards.action
+    settings.task.lost_at = settings.task.pop("termination_distance")
+    settings.task.finger = settings.task.pop("residual_scale_fingers")
+    OmegaConf.save(settings, written)
+    other = dataclasses.replace(config.task, rewards=RewardWeights(action=0.5))
+    with pytest.raises(InputError, match=r"holds a training with task.rewards.action=0.002, now 0.5;"):
+        run(dataclasses.replace(config, task=other), env)
+    assert [p.steps for p in run(config, env)] == [0, 32, 64]

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from envs.parallel import Caught, ParallelEnv
-from envs.tracking import twin_of
+from envs.tracking import TrackingEnv, twin_of
 from mjx_hand.errors import InputError
 from mjx_hand.pytree import replace
 from mjx_hand.view.browser.scene import MeshLayer
-from train.experiment.setup import TrackingSetup
 from train.learning.unstable import UnstableLog, load_unstable, step_again
 from train.play import viewer
 from train.settings.config import Config
@@ -24,9 +23,9 @@ FINGER = 7  # any target of a hinge
 
 
 @pytest.fixture(scope="module")
-def caught(setup: TrackingSetup) -> Caught:
+def caught(env: TrackingEnv) -> Caught:
     """Three worlds; a finger of the second one is told to go nowhere. One step, and another."""
-    parallel = ParallelEnv(setup.env, guard=True)
+    parallel = ParallelEnv(env, guard=True)
     state = parallel.reset(jax.random.split(jax.random.key(0), 3))
     twin = twin_of(state)
     lost = replace(twin, residual=twin.residual.at[1, FINGER].set(jnp.nan))
@@ -43,8 +42,8 @@ def test_the_state_before_the_step_is_kept(caught: Caught):
     np.testing.assert_array_equal(caught.action[1], np.full(26, 0.5, np.float32))
 
 
-def test_it_is_written_once_and_steps_again(caught: Caught, setup: TrackingSetup, tmp_path: Path):
-    log = UnstableLog(tmp_path / "unstable", setup.env, seed=3)
+def test_it_is_written_once_and_steps_again(caught: Caught, env: TrackingEnv, tmp_path: Path):
+    log = UnstableLog(tmp_path / "unstable", env, seed=3)
     (path,) = log.write(64, caught)
     assert path.name == "000000000064-1.npz"
     assert log.write(96, caught) == []
@@ -52,7 +51,7 @@ def test_it_is_written_once_and_steps_again(caught: Caught, setup: TrackingSetup
     assert (found.seed, found.steps, found.world, found.demonstration) == (3, 64, 1, 0)
     np.testing.assert_array_equal(found.qpos, caught.twin.physics.qpos[1])
     assert np.flatnonzero(np.isnan(found.targets)).tolist() == [FINGER]
-    model, substeps = setup.env.engine.models[found.demonstration], setup.env.engine.substeps
+    model, substeps = env.engine.models[found.demonstration], env.engine.substeps
     assert len(step_again(model, found, substeps)) == 1, "it diverges again, in the first physics step"
     told = np.where(np.isnan(found.targets), 0.0, found.targets)
     low, high = model.actuator_ctrlrange.T
@@ -68,12 +67,12 @@ def test_another_file_is_refused(tmp_path: Path):
         load_unstable(tmp_path / "x.npz")
 
 
-def test_the_viewer_shows_every_physics_step(caught: Caught, setup: TrackingSetup, tiny: Config, tmp_path: Path):
-    (path,) = UnstableLog(tmp_path, setup.env, seed=3).write(64, caught)
+def test_the_viewer_shows_every_physics_step(caught: Caught, env: TrackingEnv, tiny: Config, tmp_path: Path):
+    (path,) = UnstableLog(tmp_path, env, seed=3).write(64, caught)
     found = load_unstable(path)
-    model, substeps = setup.env.engine.models[0], setup.env.engine.substeps
+    model, substeps = env.engine.models[0], env.engine.substeps
     mended = replace(found, targets=np.where(np.isnan(found.targets), 0.0, found.targets))
-    scene = unstable_scene(mended, setup, "tiny")
+    scene = unstable_scene(mended, env, "tiny")
     assert scene.num_frames == substeps + 1
     assert scene.fps == pytest.approx(1 / model.opt.timestep)
     assert f"seed 3, world 1 at 64 steps: demonstration 0, frame {found.frame}; 5 of 5 physics steps" in scene.title
@@ -91,10 +90,8 @@ def test_the_viewer_shows_every_physics_step(caught: Caught, setup: TrackingSetu
         assert nearest < 1e-5, "the twin's links stand where the engine has them"
 
 
-def test_the_browser_gets_it_by_name(
-    caught: Caught, setup: TrackingSetup, trained: object, tiny: Config, tmp_path: Path
-):
-    (path,) = UnstableLog(tmp_path, setup.env, seed=3).write(64, caught)
+def test_the_browser_gets_it_by_name(caught: Caught, env: TrackingEnv, trained: object, tiny: Config, tmp_path: Path):
+    (path,) = UnstableLog(tmp_path, env, seed=3).write(64, caught)
     playing = dataclasses.replace(tiny, play=Play(port=0, unstable=str(path)))
     shown = viewer(playing)
     try:

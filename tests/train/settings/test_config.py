@@ -10,7 +10,7 @@ from mjx_hand.errors import InputError
 from train.settings.config import Config, compose, compose_seeds
 
 ROOT = Path(__file__).resolve().parent.parent.parent.parent
-EXPERIMENTS = sorted(path.stem for path in (ROOT / "configs" / "config").glob("*.yaml"))
+EXPERIMENTS = sorted(path.stem for path in (ROOT / "configs" / "config").glob("*.yaml") if path.stem != "given")
 
 
 def refusal(*overrides: str) -> str:
@@ -58,6 +58,10 @@ def test_what_is_composed_is_frozen_and_hashable():
     [
         ("ppo.num_env=8", "did you mean ppo.num_envs?"),
         ("task.grip_forse=1", "did you mean task.grip_force?"),
+        (
+            "task.rewards.positon=2",
+            "did you mean task.rewards.position?; valid in task.rewards: position, rotation, action",
+        ),
         ("enginee=native", "did you mean engine?"),
         ("data.capture.markr_noise=0", "did you mean data.capture.marker_noise?"),
     ],

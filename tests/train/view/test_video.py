@@ -8,20 +8,20 @@ import pytest
 
 from envs.evaluation.evaluate import Evaluation
 from envs.evaluation.rollout import Rollouts
+from envs.tracking import TrackingEnv
 from mjx_hand.view.video import video as view_video
 from mjx_hand.view.video.renderer import RendererUnavailable
 from train.experiment.evaluate_seeds import median_and_worst
-from train.experiment.setup import TrackingSetup
 from train.view.video import film, side_by_side
 
 FRAMES = 9
 
 
 @pytest.fixture(scope="module")
-def rollouts(setup: TrackingSetup) -> Rollouts:
+def rollouts(env: TrackingEnv) -> Rollouts:
     """The reference itself, without physics: what is drawn left is then what is drawn right."""
-    targets = np.asarray(setup.env.reference.targets)[:, :FRAMES]
-    pose = np.asarray(setup.env.reference.object_pose)[:, :FRAMES]
+    targets = np.asarray(env.reference.targets)[:, :FRAMES]
+    pose = np.asarray(env.reference.object_pose)[:, :FRAMES]
     count = len(targets)
     joints, tips = np.zeros((count, FRAMES, 16, 3)), np.zeros((count, FRAMES, 5, 3))
     counted = np.ones((count, FRAMES), bool)
@@ -38,7 +38,7 @@ def rollouts(setup: TrackingSetup) -> Rollouts:
         counted=counted,
         held=~counted,
         reward=np.zeros((count, FRAMES)),
-        fps=setup.env.fps,
+        fps=env.fps,
     )
 
 
@@ -52,15 +52,15 @@ def frames_of(path: Path) -> tuple[float, np.ndarray]:
     return fps, np.frombuffer(done.stdout, np.uint8).reshape(-1, int(height), int(width), 3)
 
 
-def test_demonstration_and_twin_stand_side_by_side(setup: TrackingSetup, rollouts: Rollouts, tmp_path):
+def test_demonstration_and_twin_stand_side_by_side(env: TrackingEnv, rollouts: Rollouts, tmp_path):
     try:
-        side_by_side(setup, rollouts, 0, tmp_path / "twin.mp4")
+        side_by_side(env, rollouts, 0, tmp_path / "twin.mp4")
     except RendererUnavailable as error:
         pytest.skip(str(error))
     fps, frames = frames_of(tmp_path / "twin.mp4")
     # 8 of 9 frames count; at 50 frames a second every other one is shown, so that the video keeps time.
     assert frames.shape == (4, 480, 964, 3)
-    assert fps == pytest.approx(setup.env.fps / 2)
+    assert fps == pytest.approx(env.fps / 2)
     below = slice(60, None)  # captions differ
     left, right = frames[:, below, :480].astype(int), frames[:, below, 484:].astype(int)
     assert left.std() > 10, "there is something to see"
@@ -84,19 +84,19 @@ def test_a_failure_is_worse_than_a_success_with_a_larger_error():
     assert chosen["median"] == (0, 2)  # of 0.5, 1, 1.5 and 2 the third
 
 
-def test_a_page_gets_a_film(setup: TrackingSetup, rollouts: Rollouts, tmp_path):
-    made = film(setup, rollouts, 0, tmp_path / "twin.mp4", "Left and right.")
+def test_a_page_gets_a_film(env: TrackingEnv, rollouts: Rollouts, tmp_path):
+    made = film(env, rollouts, 0, tmp_path / "twin.mp4", "Left and right.")
     if made.path is None:
         pytest.skip(made.missing)
     assert (made.path, made.caption, made.missing) == (tmp_path / "twin.mp4", "Left and right.", "")
     assert made.path.stat().st_size > 1000
 
 
-def test_a_page_is_told_why_there_is_no_film(setup: TrackingSetup, rollouts: Rollouts, tmp_path, monkeypatch):
+def test_a_page_is_told_why_there_is_no_film(env: TrackingEnv, rollouts: Rollouts, tmp_path, monkeypatch):
     def without_graphics(*_: object, **__: object) -> None:
         raise RendererUnavailable("no OpenGL here; install libegl1")
 
     monkeypatch.setattr(view_video, "open_renderer", without_graphics)
-    made = film(setup, rollouts, 0, tmp_path / "twin.mp4", "")
+    made = film(env, rollouts, 0, tmp_path / "twin.mp4", "")
     assert (made.path, made.missing) == (None, "no OpenGL here; install libegl1")
     assert list(tmp_path.iterdir()) == []

@@ -8,13 +8,13 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from envs.physics import default_engine
+from envs.tracking import TrackingEnv
 from mjx_hand.progress import clock
 from train.benchmark.contestants import Contestant
-from train.benchmark.engines import config
+from train.benchmark.engines import small_env
 from train.benchmark.gpu.budget import Budget
 from train.benchmark.gpu.record import Record
 from train.benchmark.gpu.scale import Scale
-from train.experiment.setup import TrackingSetup, make_setup
 from train.reports.machine import accelerator
 
 
@@ -45,14 +45,14 @@ class Bench:
     out: Path
     demonstrations: Path
     contestants: dict[tuple[str, str, int], Contestant] = dataclasses.field(default_factory=dict)
-    trained: dict[str, TrackingSetup] = dataclasses.field(default_factory=dict)
-    _setups: dict[tuple[str, str], TrackingSetup] = dataclasses.field(default_factory=dict)
+    trained: dict[str, TrackingEnv] = dataclasses.field(default_factory=dict)
+    _environments: dict[tuple[str, str], TrackingEnv] = dataclasses.field(default_factory=dict)
 
-    def setup(self, engine: str, grasp: str) -> TrackingSetup:
+    def env(self, engine: str, grasp: str) -> TrackingEnv:
         """The type's small set, which `train.benchmark engines` measures too, on an engine."""
-        if (engine, grasp) not in self._setups:
-            self._setups[engine, grasp] = make_setup(config(engine, grasp, self.demonstrations), "train")
-        return self._setups[engine, grasp]
+        if (engine, grasp) not in self._environments:
+            self._environments[engine, grasp] = small_env(engine, grasp, self.demonstrations)
+        return self._environments[engine, grasp]
 
     def say(self, text: str) -> None:
         """A line of progress with the time that is left."""

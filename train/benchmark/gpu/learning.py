@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from mjx_hand.view.figures import plots
 from train.benchmark.contestants import environment, physics
@@ -12,7 +13,7 @@ from train.benchmark.gpu.bench import Bench
 from train.benchmark.gpu.record import Record, Table
 from train.benchmark.gpu.scale import gpu_config
 from train.benchmark.learning import measure_learning
-from train.experiment.setup import TrackingSetup, make_setup
+from train.experiment.setup import load_env, make_sets
 from train.learning.curve import Point, is_finished
 from train.ppo import train
 from train.settings.config import Config
@@ -26,10 +27,10 @@ SPEED_COLUMNS = (
 
 def speed(bench: Bench, engine: str, setup: str, worlds: int, table: Table) -> None:
     """PPO's control steps a second on the pinch, a row of the table."""
-    made = bench.setup(engine, "pinch")
+    made = bench.env(engine, "pinch")
     config = gpu_config("pinch", bench.scale, bench.demonstrations, bench.out)
-    alone = bench.contestants.get((engine, "pinch", worlds)) or physics(made.env, worlds)
-    around = environment(made.env, worlds)
+    alone = bench.contestants.get((engine, "pinch", worlds)) or physics(made, worlds)
+    around = environment(made, worlds)
     found = measure_learning(config, made, alone, around, bench.scale.runs, bench.scale.seconds)
     shares = (f"{found.physics_share:.0%}", f"{found.learner_share:.0%}")
     rate = found.rate
@@ -61,8 +62,8 @@ def to_success(
     config = gpu_config(name, bench.scale, bench.demonstrations, bench.out / folder)
     config = _longer(config, bench.scale.long_steps) if further else dataclasses.replace(config, fresh=True)
     with bench.timed() as making:
-        setup = _setup(bench, config, record)
-    engine = setup.env.engine.name
+        env = _env(bench, config, record)
+    engine = env.engine.name
     config = dataclasses.replace(config, engine=engine)
     table = record.table("steps", "seconds", "of them evaluating", "success", "tracking error, cm")
     moments: list[Moment] = []
@@ -78,7 +79,7 @@ def to_success(
             keep()
         return not bench.budget.fits(_SAVING)
 
-    points = train(config, setup, watch)
+    points = train(config, env, watch)
     record.notes.insert(0, _story(config, engine, making[0], moments, points, bench.scale.learned))
     if not is_finished(config, points):
         record.left_out.append(f"what comes after {points[-1].steps:,} steps")
@@ -95,18 +96,19 @@ def _longer(config: Config, steps: int) -> Config:
     return dataclasses.replace(config, ppo=ppo, checks=checks)
 
 
-def _setup(bench: Bench, config: Config, record: Record) -> TrackingSetup:
+def _env(bench: Bench, config: Config, record: Record) -> TrackingEnv:
     """The training part, made once; on the host's engine, and that is noted, where the GPU's refuses its objects."""
     engine = bench.scale.training_engine or bench.engine
     if config.name not in bench.trained:
+        make_sets(config)
         try:
-            setup = make_setup(dataclasses.replace(config, engine=engine), "train")
+            env = load_env(dataclasses.replace(config, engine=engine), "train")
         except InputError as error:
             if engine == "native":
                 raise
             record.notes.append(f"Engine {engine} refuses these demonstrations: {error}. Physics is native.")
-            setup = make_setup(dataclasses.replace(config, engine="native"), "train")
-        bench.trained[config.name] = setup
+            env = load_env(dataclasses.replace(config, engine="native"), "train")
+        bench.trained[config.name] = env
     return bench.trained[config.name]
 
 

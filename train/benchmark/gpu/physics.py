@@ -24,7 +24,7 @@ _MORE = 1.5  # what the next point may take of the last one's seconds
 
 def agreement(bench: Bench, engine: str, record: Record, keep: Callable[[], None]) -> None:
     """Whether the engine comes as near to the C engine as the tests demand."""
-    env = bench.setup(engine, "pinch").env
+    env = bench.env(engine, "pinch")
     worlds = free_and_gripping(env)
     given = (worlds.variant, worlds.qpos, worlds.qvel, worlds.controls)
     with bench.timed() as took:
@@ -65,7 +65,7 @@ def sweep(bench: Bench, engine: str, worlds: Sequence[int], record: Record, keep
     panels: dict[str, dict[str, np.ndarray]] = {}
     expected = _FIRST_POINT * scale.patience
     for grasp in scale.grasps:
-        env = bench.setup(engine, grasp).env
+        env = bench.env(engine, grasp)
         for count in worlds:
             if not bench.enough(record, f"{grasp}, {engine}, {count:,} worlds", expected):
                 continue

@@ -8,11 +8,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.contacts import demonstration_gaps
-from envs.demonstrations.dataset import SetSettings, set_folder
 from envs.demonstrations.from_recording.demonstration import read_demonstration
 from envs.demonstrations.from_recording.grasp_pose import last_phalanges
 from envs.demonstrations.from_recording.support_plane import estimate_support_plane, world_from_recording
 from envs.demonstrations.from_recording.variations import RecordingSettings, vary
+from envs.demonstrations.set_settings import SetSettings, set_folder
 from envs.demonstrations.twin_hands import twins
 from mjx_hand.capture.datasets.dexmv_object import RecordedObject, load_object, recording_files
 from mjx_hand.errors import InputError

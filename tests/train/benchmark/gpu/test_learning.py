@@ -35,19 +35,20 @@ def test_the_story_tells_compiling_learning_and_evaluating_apart(bench, tmp_path
 
 
 def test_an_engine_that_refuses_the_objects_is_noted_and_physics_is_native(bench, monkeypatch, tmp_path):
-    made, setup = [], bench.setup("native", "pinch")
+    made, env = [], bench.env("native", "pinch")
 
-    def make_setup(config, part):
+    def load_env(config, part):
         made.append(config.engine)
         if config.engine == "warp":
             raise InputError("model 1 differs")
-        return setup
+        return env
 
-    monkeypatch.setattr(learning, "make_setup", make_setup)
+    monkeypatch.setattr(learning, "load_env", load_env)
+    monkeypatch.setattr(learning, "make_sets", lambda config: None)
     bench = dataclasses.replace(bench, engine="warp", scale=dataclasses.replace(REHEARSAL, training_engine=None))
     record = Record("learn", "")
     config = learning.gpu_config("all", REHEARSAL, tmp_path, tmp_path)
-    assert learning._setup(bench, config, record) is setup
+    assert learning._env(bench, config, record) is env
     assert made == ["warp", "native"]
     assert record.notes == ["Engine warp refuses these demonstrations: model 1 differs. Physics is native."]
 

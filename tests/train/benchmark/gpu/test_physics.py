@@ -42,7 +42,7 @@ def test_a_sweep_keeps_each_point_and_names_those_that_time_did_not_suffice_for(
 
 
 def test_a_point_is_physics_steps_of_all_worlds(bench):
-    rate, (compiling, ready, peak, in_use) = physics._point(bench, bench.setup("native", "pinch").env, "pinch", 4)
+    rate, (compiling, ready, peak, in_use) = physics._point(bench, bench.env("native", "pinch"), "pinch", 4)
     assert rate is not None
     assert compiling is not None
     assert ready is not None

@@ -1,0 +1,52 @@
+"""`load`: an environment ready to step, by the name of a grasp type or from a folder of finished demonstrations."""
+
+from pathlib import Path
+
+from envs.demonstrations.load_set import load_demonstrations
+from envs.demonstrations.set_settings import GIVEN, SetSettings
+from envs.demonstrations.twin_hands import twins
+from envs.task import Task
+from envs.tracking import TrackingEnv
+from mjx_hand.errors import InputError
+
+
+def load(
+    grasp: str = "",
+    part: str = "train",
+    engine: str = "auto",
+    task: Task | None = None,
+    root: str | Path = "outputs/demonstrations",
+    folder: str | Path | None = None,
+) -> TrackingEnv:
+    """The tracking environment over the demonstrations of a grasp type, or over a folder of finished ones.
+
+        env = envs.load("pinch")
+        env = envs.load(folder="my_demonstrations", task=envs.Task(grip_force=2.0))
+
+    Nothing is made: `python -m envs.demonstrations config=pinch` makes a type's default set.
+
+    Args:
+        grasp: name of a grasp type, or "all".
+        part: "train" or "heldout".
+        engine: "auto", "native", "mjx" or "warp".
+        task: residuals, rewards, resets; None for the default.
+        root: folder below which demonstration sets are kept.
+        folder: of `train/NNN.npz` and `heldout/NNN.npz`, or of `NNN.npz` (`mjx_hand.save_demonstration` writes them).
+
+    Raises:
+        InputError: a type and a folder, or neither; a set that is not made; an empty folder; or as `TrackingEnv`.
+    """
+    if bool(grasp) == (folder is not None):
+        raise InputError(f"grasp is {grasp!r} and folder {folder}; give one of them")
+    settings = SetSettings(grasp) if folder is None else SetSettings(GIVEN, folder=str(folder))
+    return env_of_set(settings, part, engine, task, root)
+
+
+def env_of_set(settings: SetSettings, part: str, engine: str, task: Task | None, root: str | Path) -> TrackingEnv:
+    """The environment over one part of any set, as `load`.
+
+    Raises:
+        InputError: as `load`.
+    """
+    demonstrations = load_demonstrations(settings, part, root)
+    return TrackingEnv(demonstrations, twins(demonstrations), engine, task)

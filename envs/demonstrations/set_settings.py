@@ -1,0 +1,109 @@
+"""`SetSettings`: what a demonstration set holds, and where it is kept."""
+
+import dataclasses
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+from envs.demonstrations.from_recording.demonstration import RECORDED
+from envs.demonstrations.from_recording.variations import RecordingSettings
+from envs.demonstrations.scripted.simulated_capture import CaptureSettings
+from envs.grasps import grasp_names, grasp_type
+from mjx_hand.capture.datasets.dexmv_object import recording_files
+from mjx_hand.errors import InputError
+
+ALL = "all"
+GIVEN = "given"
+_VERSION = 3  # of the generator: a change that makes other demonstrations of the same settings raises it
+_RECORDED_VERSION = 3  # the same of what is made of a recording
+
+
+@dataclasses.dataclass(frozen=True)
+class SetSettings:
+    """What a demonstration set holds.
+
+    Attributes:
+        grasp: name of the grasp type, "all" for a set of each type, "recorded" for what a real recording shows, or
+            "given" for a folder of finished demonstrations, of which nothing is made.
+        people: random hand shapes in the training part.
+        heldout_people: others, in the held-out part.
+        trials: demonstrations of each person.
+        seed: of every draw; the held-out part uses the next one.
+        capture: how they are recorded.
+        recording: the real recording, and how it is varied; of the other settings it uses the seed.
+        folder: of finished demonstrations, as `load_set.load_part` reads it.
+    """
+
+    grasp: str
+    people: int = 8
+    heldout_people: int = 4
+    trials: int = 8
+    seed: int = 0
+    capture: CaptureSettings = dataclasses.field(default_factory=CaptureSettings)
+    recording: RecordingSettings = dataclasses.field(default_factory=RecordingSettings)
+    folder: str = ""
+
+    def __post_init__(self):
+        if self.grasp not in (ALL, RECORDED, GIVEN):
+            grasp_type(self.grasp)
+        if (self.grasp == GIVEN) != bool(self.folder):
+            raise InputError(
+                f"data.grasp is {self.grasp!r} and data.folder {self.folder!r}; give data.folder=PATH alone for "
+                "finished demonstrations, or a grasp type and no folder"
+            )
+        if (self.grasp == RECORDED) != bool(self.recording.path):
+            raise InputError(
+                f"data.grasp is {self.grasp!r} and data.recording.path {self.recording.path!r}; "
+                f"give both, data.grasp={RECORDED} and the recording's folder, or a grasp type and no recording"
+            )
+        for name in ("people", "heldout_people", "trials"):
+            if getattr(self, name) < 1:
+                raise InputError(f"data.{name} is {getattr(self, name)}; it must be at least 1")
+        if self.seed < 0:
+            raise InputError(f"data.seed is {self.seed}; it must not be negative")
+
+    def expand_types(self) -> tuple["SetSettings", ...]:
+        """The settings of the single sets that are made: one, one of every grasp type, or none of a given folder."""
+        if self.grasp == GIVEN:
+            return ()
+        names = grasp_names() if self.grasp == ALL else [self.grasp]
+        return tuple(dataclasses.replace(self, grasp=name) for name in names)
+
+
+def set_folder(settings: SetSettings, root: str | Path) -> Path:
+    """Where a set of these settings lives below `root`: its name carries a digest of all settings and of the type.
+
+    Raises:
+        InputError: several or finished sets, which have no such folder, or a recording that is not there.
+    """
+    ingredients: list[Any] = [_VERSION, fingerprint(settings)]
+    recording = ingredients[1].pop("recording")
+    if settings.grasp == RECORDED:
+        files = _recording_files(settings.recording)
+        ingredients = [
+            _RECORDED_VERSION,
+            settings.seed,
+            recording,
+            *(hashlib.sha256(f.read_bytes()).hexdigest() for f in files),
+        ]
+    else:
+        grasp = dataclasses.asdict(grasp_type(settings.grasp))
+        del grasp["grip_force"]  # it is the twin's: the same demonstrations are made whatever it is
+        ingredients.append(grasp)
+    content = json.dumps(ingredients, sort_keys=True)
+    return Path(root) / f"{settings.grasp}-{hashlib.sha256(content.encode()).hexdigest()[:10]}"
+
+
+def fingerprint(settings: SetSettings) -> dict[str, Any]:
+    """All settings that tell sets apart, as in `CaptureSettings.fingerprint`."""
+    told = dataclasses.asdict(settings) | {"capture": settings.capture.fingerprint()}
+    del told["folder"]  # what it holds tells, not where it is: `load_set.part_digest`
+    return told
+
+
+def _recording_files(settings: RecordingSettings) -> tuple[Path, Path]:
+    try:
+        return recording_files(settings.path)
+    except InputError as error:
+        raise InputError(f"{error}: data.recording.path=FOLDER") from None
