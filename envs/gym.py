@@ -7,13 +7,12 @@ What `make_vector_env` takes can be given there too.
 
 from pathlib import Path
 
-from envs.demonstrations.dataset import SetSettings, load_part, make_set
-from envs.demonstrations.twin_hands import twins
+from envs.demonstrations.dataset import make_missing_sets
+from envs.demonstrations.load_env import env_of_set
+from envs.demonstrations.set_settings import SetSettings
 from envs.grasps import grasp_names
 from envs.task import Task
-from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
-from mjx_hand.progress import shares
 
 try:
     import gymnasium
@@ -50,9 +49,9 @@ def make_vector_env(
         InputError: what cannot be used, by name.
     """
     settings = SetSettings(data) if isinstance(data, str) else data
-    with shares() as report:
-        loaded = load_part(make_set(settings, demonstrations, report), part)
-    return TrackingVectorEnv(TrackingEnv(loaded, twins(loaded), engine, task), num_envs, seed, autoreset_mode)
+    make_missing_sets(settings, demonstrations)
+    env = env_of_set(settings, part, engine, task, demonstrations)
+    return TrackingVectorEnv(env, num_envs, seed, autoreset_mode)
 
 
 for _name in grasp_names():

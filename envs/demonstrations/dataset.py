@@ -26,6 +26,7 @@ from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion.demonstration import load_demonstration, save_demonstration
 from mjx_hand.motion.motion import load_motion_file, save_motion
+from mjx_hand.progress import shares
 from mjx_hand.pytree import replace
 from mjx_hand.retarget.hands import KinematicHands
 from mjx_hand.rigid.build import build_rigid_hand
@@ -36,6 +37,20 @@ _APART = 1_000_003  # between the seeds of the parts
 _SHAPE_LIMIT = 2.0  # standard deviations
 
 Report = Callable[[str, float], None]  # what is being done, and the share of it done
+
+
+def make_missing_sets(settings: SetSettings, root: str | Path) -> None:
+    """Make those sets that the settings stand for and that are not below `root`, and say so.
+
+    Raises:
+        InputError: as `make_set`.
+    """
+    for single in settings.expand_types():
+        folder = set_folder(single, root)
+        if not folder.is_dir():
+            print(f"{folder} is missing: making the demonstrations", flush=True)
+            with shares() as report:
+                make_set(single, root, report)
 
 
 def make_set(settings: SetSettings, root: str | Path, report: Report = lambda what, share: None) -> Path:

@@ -1,4 +1,5 @@
 import dataclasses
+from typing import Any
 
 import jax.numpy as jnp
 import pytest
@@ -19,7 +20,8 @@ def test_a_term_is_one_function_with_its_default_weight():
         **{"position": 1.0, "rotation": 1.0, "action": -0.002},
         **{"joints": 0.0, "tips": 0.0, "action_rate": 0.0},
     }
-    assert dataclasses.asdict(Task().rewards) == {name: term.weight for name, term in TERMS.items()}
+    weights: Any = Task().rewards
+    assert dataclasses.asdict(weights) == {name: term.weight for name, term in TERMS.items()}
     assert all(term.value.__name__ == name and term.value.__doc__ for name, term in TERMS.items())
     assert metric_names(RewardWeights(action=0.0, tips=1.0)) == (
         *("reward/position", "reward/rotation", "reward/action"),

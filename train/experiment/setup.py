@@ -3,16 +3,14 @@
 import dataclasses
 from pathlib import Path
 
-from envs.demonstrations.dataset import make_set
+from envs.demonstrations.dataset import make_missing_sets
 from envs.demonstrations.load_env import env_of_set
 from envs.demonstrations.load_set import is_divided
-from envs.demonstrations.set_settings import set_folder
 from envs.evaluation.evaluate import Evaluation, evaluate
 from envs.evaluation.roll_out import make_roll_out
 from envs.evaluation.rollout import Rollouts
 from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
-from mjx_hand.progress import shares
 from train.learning.checkpoint import Checkpoint, load_checkpoint
 from train.learning.policy import deterministic_policy
 from train.settings.config import Config
@@ -24,12 +22,7 @@ def make_sets(config: Config) -> None:
     Raises:
         InputError: as `envs.demonstrations.dataset.make_set`.
     """
-    for settings in config.data.expand_types():
-        folder = set_folder(settings, config.demonstrations)
-        if not folder.is_dir():
-            print(f"{folder} is missing: making the demonstrations", flush=True)
-            with shares() as report:
-                make_set(settings, config.demonstrations, report)
+    make_missing_sets(config.data, config.demonstrations)
 
 
 def load_env(config: Config, part: str) -> TrackingEnv:
