@@ -115,6 +115,7 @@ def _check_weights(weights: "RewardWeights") -> None:
 
 if TYPE_CHECKING:
 
+    @dataclasses.dataclass(frozen=True, init=False)
     class RewardWeights:
         """The weight of each of `TERMS`; 0 leaves a term out."""
 
