@@ -21,7 +21,7 @@ except ImportError:
 
 from gymnasium.vector import AutoresetMode
 
-from envs.vector_env import TrackingVectorEnv
+from envs.gym.vector_env import TrackingVectorEnv
 
 __all__ = ["TrackingVectorEnv", "make_vector_env"]
 
