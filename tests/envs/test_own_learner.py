@@ -9,7 +9,7 @@ import pytest
 from envs.gym import TrackingVectorEnv
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "05_environment_in_your_own_learner.py"
-UPDATES, WORLDS = 30, 64  # 31,000 steps
+UPDATES, WORLDS = 20, 64  # 20,000 steps; two demonstrations are learned within 15,000
 
 
 @pytest.fixture(scope="module")
@@ -35,4 +35,4 @@ def test_the_return_rises_within_a_short_budget(env, example):
     assert min(moved) > 1e-4  # every layer's
     success, returns = np.array(scores).T
     assert returns[-1] > 1.3 * returns[0]
-    assert success[-1] >= success[0]
+    assert success[-1] > success[0]
