@@ -37,8 +37,7 @@ class Plan:
 
     @property
     def steps(self) -> int:
-        ppo = self.variants[0][1][0].ppo
-        return ppo.num_timesteps or ppo.budget * ppo.steps_per_update
+        return self.variants[0][1][0].ppo.timesteps
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -72,7 +72,7 @@ def _dispatch(number: Any, *args: Any) -> Sequence[np.ndarray]:
     first = int(numbers[0])
     if numbers.size > 1 and (numbers != first).any():
         raise ValueError("one call is for one host function; these elements of a batch name several")
-    return _functions[first](*args)
+    return _functions[first](*map(np.asarray, args))  # JAX arrays, where JAX itself makes the call
 
 
 class _Buffer(ctypes.Structure):

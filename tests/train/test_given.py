@@ -79,7 +79,9 @@ def test_a_missing_set_is_made_by_a_step_of_its_own_which_says_so(tiny: Config, 
     with pytest.raises(InputError, match=r"not made yet; .*python -m envs.demonstrations config=pinch"):
         load_env(config, "train")
     made = []
-    monkeypatch.setattr("train.experiment.setup.make_set", lambda settings, root, report: made.append((settings, root)))
+    monkeypatch.setattr(
+        "envs.demonstrations.dataset.make_set", lambda settings, root, report: made.append((settings, root))
+    )
     make_sets(config)
     assert made == [(tiny.data, str(tmp_path))]
     assert f"{set_folder(tiny.data, tmp_path)} is missing: making the demonstrations" in capsys.readouterr().out

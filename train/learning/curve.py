@@ -44,8 +44,7 @@ def is_finished(config: Config, points: Sequence[Point]) -> bool:
     """Whether a training with these evaluations has done all its steps, or reached what it may stop at."""
     if not points:
         return False
-    last = config.ppo.budget * config.ppo.steps_per_update
-    return points[-1].steps >= last or points[-1].success >= config.checks.stop_at
+    return points[-1].steps >= config.ppo.timesteps or points[-1].success >= config.checks.stop_at
 
 
 def minutes_to_learn(points: Sequence[Point], share: float = LEARNED) -> float | None:

@@ -70,9 +70,14 @@ class Ppo:
         return self.num_envs * self.unroll_length
 
     @property
+    def timesteps(self) -> int:
+        """Control steps of all worlds together after which the training is over; its last update may go beyond."""
+        return self.num_updates * self.steps_per_update if self.num_timesteps is None else self.num_timesteps
+
+    @property
     def budget(self) -> int:
-        """Updates until the training is over; the last one ends at or after `num_timesteps`."""
-        return self.num_updates if self.num_timesteps is None else -(-self.num_timesteps // self.steps_per_update)
+        """Updates until the training is over."""
+        return -(-self.timesteps // self.steps_per_update)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from envs.demonstrations import dataset
+from envs.demonstrations import set_settings
 from envs.demonstrations.__main__ import main, settings_of
 from envs.demonstrations.dataset import YIELD
 from envs.demonstrations.load_set import PARTS
@@ -62,7 +62,7 @@ def test_bad_arguments_are_refused_in_one_line(arguments, words):
 def test_a_changed_grasp_type_is_another_set(monkeypatch, tmp_path):
     heavier = dataclasses.replace(grasp_type("pinch"), object_mass=(0.3, 0.4))
     before = set_folder(SETTINGS, tmp_path)
-    monkeypatch.setattr(dataset, "grasp_type", lambda name: heavier)
+    monkeypatch.setattr(set_settings, "grasp_type", lambda name: heavier)
     assert set_folder(SETTINGS, tmp_path) != before
 
 

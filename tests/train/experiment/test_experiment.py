@@ -81,7 +81,7 @@ def test_all_types_are_made_trained_evaluated_and_played(everything: Config, tmp
     kinds = {d.object.kind for d in env.demonstrations}
     assert kinds == {grasp_type(name).object_kind for name in grasp_names()}
     points = train.ppo.train(config, env)
-    assert points[-1].steps >= config.ppo.budget * config.ppo.steps_per_update
+    assert points[-1].steps >= config.ppo.timesteps
 
     monkeypatch.setattr(video, "side_by_side", lambda env, rollouts, index, path: Path(path).write_bytes(b"film"))
     folder, (_, _, by_type) = evaluate_and_write([config])
