@@ -7,6 +7,7 @@ import numpy as np
 
 from mjx_hand.capture.keypoint_files.load_keypoints import chosen, keypoint_contents, recognised
 from mjx_hand.capture.keypoints.layouts import KEYPOINTS
+from mjx_hand.capture.keypoints.plausible import keypoint_findings
 from mjx_hand.capture.keypoints.recording import KeypointRecording
 from mjx_hand.capture.keypoints.side import known_side
 from mjx_hand.capture.marker_files.load_markers import load_markers
@@ -17,10 +18,12 @@ from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
 from mjx_hand.hand.mano_file import load_mano_file
 from mjx_hand.motion import Demonstration, JointMotion, Motion
+from mjx_hand.pytree import replace
 from mjx_hand.robots.robot_motion import RobotMotion
 
 Facts = tuple[tuple[str, str], ...]
 
+MOST_STARTS = 16  # of labels that are tried as a prefix: more are not people, but other words
 BIGGEST_HAND, BIGGEST_ROOM = 1.0, 30.0  # m; what is bigger is in another unit
 
 
@@ -33,6 +36,7 @@ def motion(found: Motion) -> Facts:
         ("units", "metres, radians, seconds; quaternions wxyz"),
         ("wrist", _travel(found.wrist_position[found.valid])),
         ("source", found.source or "not said"),
+        *_warnings(found.warnings),
     )
 
 
@@ -45,6 +49,7 @@ def joint_motion(found: JointMotion) -> Facts:
         ("units", "radians, metres, seconds; quaternions wxyz"),
         ("wrist", _travel(found.wrist_position)),
         ("source", found.source or "not said"),
+        *_warnings(found.warnings),
     )
 
 
@@ -57,6 +62,7 @@ def robot_motion(found: RobotMotion) -> Facts:
         ("units", "radians, metres, seconds; quaternions wxyz"),
         ("base", _travel(found.base_position)),
         ("source", found.source or "not said"),
+        *_warnings(found.warnings),
     )
 
 
@@ -101,7 +107,7 @@ def keypoints(path: Path, side: str | None, sequence: str | None, fps: float | N
         if rate
         else ("frames", f"{found.num_frames}, at a rate that the file does not say")
     )
-    return reader.name, (names, ("side", which), frames, *_points(found)), choice
+    return reader.name, (names, ("side", which), frames, *_points(found), *_doubts(replace(found, fps=rate))), choice
 
 
 def _points(found: KeypointRecording) -> Facts:
@@ -123,9 +129,9 @@ def _points(found: KeypointRecording) -> Facts:
     )
 
 
-def markers(path: Path, units: str | None = None) -> tuple[Facts, str]:
+def markers(path: Path, units: str | None = None, fps: float | None = None) -> tuple[Facts, str]:
     """Of a marker recording: what is in it, and the options of `mjx-hand fit` that suit it best."""
-    found = load_markers(path, units)
+    found = load_markers(path, units, fps)
     suits, options = _suitable_set(found)
     missing = 1 - found.visible.mean(axis=0)
     worst = np.argsort(-missing)[:3]
@@ -140,7 +146,8 @@ def markers(path: Path, units: str | None = None) -> tuple[Facts, str]:
         ("units", f"metres, from the file's {units if units else 'own unit'}"),
         ("extent", f"{' x '.join(f'{e:.3g}' for e in extent)} m over all frames{doubt}"),
         ("marker set", suits),
-    ), options + (f" --units {units}" if units else "")
+        *_warnings(found.warnings),
+    ), options + (f" --units {units}" if units else "") + (f" --fps {fps:g}" if fps else "")
 
 
 def _suitable_set(found: MarkerRecording) -> tuple[str, str]:
@@ -150,7 +157,7 @@ def _suitable_set(found: MarkerRecording) -> tuple[str, str]:
     for name in INCLUDED:
         marker_set = included_marker_set(hand, name)
         starts = label_starts(found.names, marker_set)
-        for start in ("", *starts):
+        for start in ("", *starts[:MOST_STARTS]):
             try:
                 share = len(match_labels(found, marker_set, start).recording.names) / len(marker_set.names)
             except InputError:  # none of its labels, or two hands
@@ -208,6 +215,15 @@ def robot(path: Path) -> tuple[str, Facts]:
             ("joints", str(joints)),
         )
     raise InputError(f"{path}: XML of {root.tag!r}, neither a URDF (robot) nor an MJCF (mujoco)")
+
+
+def _warnings(warnings: tuple[str, ...]) -> Facts:
+    return tuple(("warning", warning) for warning in warnings)
+
+
+def _doubts(found: KeypointRecording) -> Facts:
+    """What the file says is doubtful, and what a result of it would be warned about, or refused for."""
+    return _warnings(tuple(dict.fromkeys((*found.warnings, *map(str, keypoint_findings(found, load_hand()))))))
 
 
 def _frames(count: int, fps: float) -> tuple[str, str]:

@@ -8,6 +8,7 @@ from mjx_hand.capture.datasets.dataset_format import dataset_formats
 from mjx_hand.capture.datasets.keypoints import FORMAT as KEYPOINTS
 from mjx_hand.capture.keypoint_files.load_keypoints import is_keypoint_file
 from mjx_hand.capture.load import load_motion
+from mjx_hand.capture.marker_files.load_markers import marker_format_of
 from mjx_hand.capture.marker_files.marker_format import marker_formats
 from mjx_hand.capture.markers.marker_recording import SCHEMA as MARKERS
 from mjx_hand.cli import facts_of
@@ -63,18 +64,18 @@ def file_facts(
     if path.is_file() and path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; copy or export it again")
     return (
-        _own(path, units)
+        _own(path, units, fps)
         or _robot(path)
         or _keypoints(path, side, sequence, fps)
         or _motion(path, side, sequence, mano, fps)
         or _mano(path)
-        or _markers(path, units)
+        or _markers(path, units, fps)
         or _video(path)
         or _unknown(path)
     )
 
 
-def _own(path: Path, units: str | None) -> FileFacts | None:
+def _own(path: Path, units: str | None, fps: float | None) -> FileFacts | None:
     """Joint motions, of robots too, and demonstrations; motions, markers, keypoints are found among the recordings."""
     schema = schema_of(path)
     out = path.with_suffix("")
@@ -88,7 +89,7 @@ def _own(path: Path, units: str | None) -> FileFacts | None:
         load = f"in Python: mjx_hand.robots.robot_motion.load_robot_motion({str(path)!r})"
         return FileFacts(f"robot motion ({schema})", facts_of.robot_motion(load_robot_motion(path)), (load,))
     if schema == MARKERS:
-        return _marker_facts(path, f"markers ({schema})", out, units)
+        return _marker_facts(path, f"markers ({schema})", out, units, fps)
     return None
 
 
@@ -135,13 +136,15 @@ def _mano(path: Path) -> FileFacts | None:
     return FileFacts("MANO hand", facts, (f"mjx-hand build --out my_hand --side {side} --mano {path}",))
 
 
-def _markers(path: Path, units: str | None) -> FileFacts | None:
-    known = next((f for f in marker_formats() if path.suffix.lower() in f.suffixes and path.suffix != ".npz"), None)
-    return None if known is None or not path.is_file() else _marker_facts(path, known.name, path.with_suffix(""), units)
+def _markers(path: Path, units: str | None, fps: float | None) -> FileFacts | None:
+    if not path.is_file() or path.suffix.lower() == ".npz":
+        return None
+    known = marker_format_of(path)
+    return None if known is None else _marker_facts(path, known.name, path.with_suffix(""), units, fps)
 
 
-def _marker_facts(path: Path, kind: str, out: Path, units: str | None) -> FileFacts:
-    facts, options = facts_of.markers(path, units)
+def _marker_facts(path: Path, kind: str, out: Path, units: str | None, fps: float | None) -> FileFacts:
+    facts, options = facts_of.markers(path, units, fps)
     return FileFacts(kind, facts, (f"mjx-hand fit {path} {options} --out {out.name}.motion.npz",))
 
 

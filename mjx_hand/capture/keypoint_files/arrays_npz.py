@@ -1,8 +1,8 @@
 """Keypoints as plain arrays: `joints` (T, n, 3), or one array a hand, with what else the file says beside it.
 
 Names read: the points as `joints`, `keypoints`, `landmarks`, `positions` or `points`, or a hand each as `right` and
-`left`; `fps` or times as `t`, `time`, `times` or `timestamps`; `side`, `unit` (m, cm or mm), `layout` (a name in
-`layouts.LAYOUTS`) and `names` or `joint_names`, one a point.
+`left`; `fps`, times as `t`, `time` or `timestamp` (`timestamp_ms` says a unit), frame numbers as `frame`; `side`,
+`unit` (m, cm or mm), `layout` (a name in `layouts.LAYOUTS`) and `names` or `joint_names`, one a point.
 """
 
 from pathlib import Path
@@ -11,22 +11,28 @@ from typing import Any
 import numpy as np
 
 from mjx_hand.capture.keypoint_files.reader import KeypointReader
+from mjx_hand.capture.keypoint_files.timed_hand import timed_hand
 from mjx_hand.capture.keypoints.names import counted_keypoints, named_keypoints
-from mjx_hand.capture.keypoints.recording import SIDES, KeypointRecording, check_keypoints
+from mjx_hand.capture.keypoints.recording import SIDES, KeypointRecording
 from mjx_hand.capture.keypoints.size import unit_factor
-from mjx_hand.capture.keypoints.times import evenly, stated_rate
+from mjx_hand.capture.timeline.clock_names import names_numbers, names_time
+from mjx_hand.capture.timeline.compare_clocks import stated_rate, timeline_of
+from mjx_hand.capture.timeline.timeline import Timeline
 from mjx_hand.files.checked_arrays import numbers
 
 POINTS = ("joints", "keypoints", "landmarks", "positions", "points", *SIDES)
-TIMES = ("t", "time", "times", "timestamps")
 NAMES = ("names", "joint_names")
-_KNOWN = {*POINTS, *TIMES, *NAMES, "fps", "side", "unit", "layout", "source"}
+_KNOWN = {*POINTS, *NAMES, "fps", "side", "unit", "layout", "source"}
+
+
+def _known(name: str) -> bool:
+    return name in _KNOWN or names_time(name) or names_numbers(name)
 
 
 def _recognises(arrays: Any) -> bool:
     hands = [np.shape(arrays[name]) for name in POINTS if name in arrays]
     # Only files that hold nothing else: many datasets have `joints` beside what they are really about.
-    return bool(hands) and set(arrays) <= _KNOWN and all(len(s) == 3 and s[2] == 3 for s in hands)
+    return bool(hands) and all(map(_known, arrays)) and all(len(s) == 3 and s[2] == 3 for s in hands)
 
 
 def _read(path: Path, arrays: Any, unit: str | None) -> dict[str, KeypointRecording]:
@@ -43,14 +49,26 @@ def _read(path: Path, arrays: Any, unit: str | None) -> dict[str, KeypointRecord
             positions, layout = counted_keypoints(path, points, said("layout"))
         else:
             positions, layout = named_keypoints(path, [str(n) for n in np.atleast_1d(names)], points)
-        fps = stated_rate(path, "fps", arrays["fps"].tolist()) if "fps" in arrays else None
-        times = next((key for key in TIMES if key in arrays), None)
-        if fps is None and times is not None:
-            fps, positions = evenly(path, numbers(path, arrays, {times: (len(points),)})[times], positions)
         side = name if name in SIDES else said("side") or ""
-        recording = KeypointRecording(fps=fps, positions=positions, side=side, layout=layout, source=path.name)
-        found[side or name] = check_keypoints(recording)
+        found[side or name] = timed_hand(
+            path, positions, _timeline(path, arrays, len(points)), side=side, layout=layout
+        )
     return found
+
+
+def _timeline(path: Path, arrays: Any, rows: int) -> Timeline:
+    def stamps(key: str | None) -> np.ndarray | None:
+        return None if key is None else numbers(path, arrays, {key: (rows,)}, finite=False)[key].astype(float)
+
+    time = next(filter(names_time, arrays), None)
+    return timeline_of(
+        path,
+        rows,
+        rate=stated_rate(path, "fps", arrays["fps"].tolist()) if "fps" in arrays else None,
+        times=stamps(time),
+        name=time or "",
+        numbers=stamps(next(filter(names_numbers, arrays), None)),
+    )
 
 
 READER = KeypointReader(name="keypoint arrays (`joints` (T, n, 3))", suffix=".npz", recognises=_recognises, read=_read)

@@ -1,24 +1,27 @@
 """Keypoints as a table: a header of `NAME_x,NAME_y,NAME_z` columns (or `x0,y0,z0,x1,…`), one line a frame.
 
-A column `time`, `t` or `timestamp` gives the rate. Lines before the header may say `# fps: 30`, `# unit: mm`,
-`# side: left` or `# layout: leap_bones`. Names that begin with `left_` or `right_` belong to that hand. Empty cells and
-`nan` are gaps.
+A column `time`, `t` or `timestamp` (`time_ms` says a unit) and one of `frame` numbers are compared with the rate. Lines
+before the header may say `# fps: 30`, `# unit: mm`, `# side: left` or `# layout: leap_bones`. Names that begin with
+`left_` or `right_` belong to that hand. Empty cells and `nan` are gaps.
 """
 
 import re
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mjx_hand.capture.keypoint_files.reader import KeypointReader
+from mjx_hand.capture.keypoint_files.timed_hand import timed_hand
 from mjx_hand.capture.keypoints.names import counted_keypoints, named_keypoints, names_a_hand
-from mjx_hand.capture.keypoints.recording import SIDES, KeypointRecording, check_keypoints
+from mjx_hand.capture.keypoints.recording import SIDES, KeypointRecording
 from mjx_hand.capture.keypoints.size import unit_factor
-from mjx_hand.capture.keypoints.times import evenly, stated_rate
+from mjx_hand.capture.timeline.clock_names import names_numbers, names_time
+from mjx_hand.capture.timeline.compare_clocks import stated_rate, timeline_of
+from mjx_hand.capture.timeline.timeline import Timeline
 from mjx_hand.errors import InputError
 
-TIMES = ("time", "t", "timestamp", "time_s", "time_ms", "timestamp_ms")
 _NAMED = re.compile(r"(.+?)[_. :-]?([xyzXYZ])")
 _COUNTED = re.compile(r"([xyz])_?(\d+)")
 _HAND = re.compile(r"(right|left)[_. :-](.+)", re.IGNORECASE)
@@ -41,7 +44,7 @@ def _columns(header: list[str]) -> Columns:
     found: Columns = {}
     for column, cell in enumerate(header):
         counted, named = _COUNTED.fullmatch(cell.lower()), _NAMED.fullmatch(cell)
-        if cell.lower() in TIMES or not (counted or named):
+        if names_time(cell) or not (counted or named):
             continue
         axis, joint = counted.groups() if counted else (named[2].lower(), named[1]) if named else ("", "")
         hand = _HAND.fullmatch(joint)
@@ -61,7 +64,7 @@ def _recognises(lines: Any) -> bool:
 
 def _read(path: Path, lines: Any, unit: str | None) -> dict[str, KeypointRecording]:
     said, header, rows = _header(lines)
-    repeated = sorted({cell for cell in header if header.count(cell) > 1})
+    repeated = sorted(cell for cell, count in Counter(header).items() if count > 1)
     if repeated:
         raise InputError(f"{path}: columns repeat: {', '.join(repeated)}; give each its own name")
     table = np.full((len(rows), len(header)), np.nan)
@@ -73,9 +76,9 @@ def _read(path: Path, lines: Any, unit: str | None) -> dict[str, KeypointRecordi
             raise InputError(
                 f"{path}: frame {k} has {len(cells)} cells of {len(header)}, or one that is no number"
             ) from None
+    timeline = _timeline(path, said, header, table)
     table[~np.isfinite(table)] = np.nan
     factor = unit_factor(str(path), unit or said.get("unit") or "m")
-    time = next((header.index(cell) for cell in header if cell.lower() in TIMES), None)
     found = {}
     for side, joints in _columns(header).items():
         short = [joint for joint, columns in joints.items() if -1 in columns]
@@ -87,13 +90,21 @@ def _read(path: Path, lines: Any, unit: str | None) -> dict[str, KeypointRecordi
             positions, layout = counted_keypoints(path, points, said.get("layout"))
         else:
             positions, layout = named_keypoints(path, names, points)
-        fps = stated_rate(path, "fps", said["fps"]) if "fps" in said else None
-        if fps is None and time is not None:
-            fps, positions = evenly(path, table[:, time], positions)
         side = side or said.get("side", "").lower()
-        recording = KeypointRecording(fps=fps, positions=positions, side=side, layout=layout, source=path.name)
-        found[side if side in SIDES else "hand"] = check_keypoints(recording)
+        found[side if side in SIDES else "hand"] = timed_hand(path, positions, timeline, side=side, layout=layout)
     return found
+
+
+def _timeline(path: Path, said: dict[str, str], header: list[str], table: np.ndarray) -> Timeline:
+    time, number = (next((k for k, c in enumerate(header) if named(c)), None) for named in (names_time, names_numbers))
+    return timeline_of(
+        path,
+        len(table),
+        rate=stated_rate(path, "fps", said["fps"]) if "fps" in said else None,
+        times=None if time is None else table[:, time],
+        name="" if time is None else header[time],
+        numbers=None if number is None else table[:, number],
+    )
 
 
 READER = KeypointReader(

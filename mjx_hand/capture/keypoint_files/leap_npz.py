@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from mjx_hand.capture.keypoint_files.reader import KeypointReader
+from mjx_hand.capture.keypoint_files.timed_hand import timed_hand
 from mjx_hand.capture.keypoints.layouts import LAYOUTS, to_keypoints
-from mjx_hand.capture.keypoints.recording import KeypointRecording, check_keypoints
+from mjx_hand.capture.keypoints.recording import KeypointRecording
 from mjx_hand.capture.keypoints.size import unit_factor
-from mjx_hand.capture.keypoints.times import evenly
+from mjx_hand.capture.timeline.compare_clocks import timeline_of
 from mjx_hand.files.checked_arrays import numbers
 
 _JOINTS = re.compile(r"(right|left)_(\w+)_joints_mm")
@@ -34,12 +35,9 @@ def _read(path: Path, arrays: Any, unit: str | None) -> dict[str, KeypointRecord
         n = numbers(path, arrays, {match[0]: ("t", 5, 4, 3), f"{name}_frame": ("t",)}, finite=False)
         joints, rows = n[match[0]].astype(float), n[f"{name}_frame"].astype(int)
         joints = np.where(np.isfinite(joints), joints, np.nan) * unit_factor(str(path), unit or "mm")
-        fps, joints = evenly(path, times[rows], joints)
+        timeline = timeline_of(path, len(rows), times=times[rows], name="t")
         positions = to_keypoints(joints.reshape(len(joints), 20, 3), LAYOUTS["leap"])
-        recording = KeypointRecording(
-            fps=fps, positions=positions, side=side, layout="leap", source=f"{path.name} {name}"
-        )
-        found[name] = check_keypoints(recording)
+        found[name] = timed_hand(path, positions, timeline, side=side, layout="leap", source=f"{path.name} {name}")
     return found
 
 
