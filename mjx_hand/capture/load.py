@@ -50,8 +50,8 @@ def load_motion(
     if markers is not None:
         if sequence is not None or fps is not None:
             raise InputError(
-                f"{path}: marker files hold one recording and its rate; leave out sequence= and fps= (of a file without "
-                "a rate: load_markers(path, fps=), fit_markers)"
+                f"{path}: marker files hold one recording and its rate; leave out sequence= and fps= (where a file "
+                "says none: load_markers(path, fps=), fit_markers)"
             )
         return _fitted(path, markers, load_hand(mano, side or "right"))
     request = Request(
