@@ -171,6 +171,7 @@ def test_variants_that_are_done_are_shown_while_others_wait(work: list[str], mon
     assert "Not done yet: spherical (no grip)." in Path("outputs/ablations/ablations.md").read_text()
 
 
+@pytest.mark.slow
 def test_a_tiny_training_and_its_baselines(
     trained: tuple[Path, list[Point]], tiny: Config, env: TrackingEnv, tmp_path, monkeypatch
 ):
