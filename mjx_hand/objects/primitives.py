@@ -86,6 +86,7 @@ def face_along(
     """
     if kind != "mesh":
         return normal * (jnp.abs(normal) @ half_extents(kind, size)) + aside, normal
+    planes = jnp.asarray(planes)
     slope = planes[..., :3] @ normal
     reach = -(planes[..., :3] @ aside + planes[..., 3])  # along the line, times the slope
     along = reach / jnp.where(jnp.abs(slope) < 1e-6, 1e-6, slope)
