@@ -17,7 +17,7 @@ from envs.demonstrations.scripted.perform import OUTCOMES, Performance, perform
 from envs.demonstrations.scripted.script import GraspMotion, Tempo, scripted_targets
 from envs.grasps import GraspType
 from envs.physics.solver import gauss_seidel
-from envs.scene import TIMESTEP, scene_model, wrist_coordinates
+from envs.scene import TIMESTEP, scene_spec, wrist_coordinates
 from mjx_hand.errors import InputError
 from mjx_hand.objects.description import ObjectDescription
 from mjx_hand.objects.primitives import half_extents
@@ -172,7 +172,7 @@ def draw_scripts(
                 object_start=np.concatenate([centre, upright]),
                 motion=_draw_motion(grasp, posture, centre, hand, gains, rng),
                 base=posture.rotation,
-                model=scene_model(hand, description, *support_boxes(grasp), posture.rotation, gains=gains),
+                model=scene_spec(hand, description, *support_boxes(grasp), posture.rotation, gains=gains).compile(),
             )
         )
     return scripts
