@@ -31,14 +31,14 @@ def test_own_bones_are_kept(tmp_path):
 def test_real_recording(recordings, tmp_path, capsys):
     path = recordings / "leap_motion" / "confidence-37fps.npz"
     assert main(["keypoints", str(path), "--sequence", "right_31", "--out", str(tmp_path / "m.npz")]) == 0
-    assert "layout leap, a right hand (as recorded), 393 frames" in capsys.readouterr().out
+    assert "layout leap, a right hand (as recorded), 561 frames" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
     ("scale", "options", "says"),
     [
         (1000.0, ["--fps", "50"], "about 1000 times too big"),
-        (1.0, [], "does not say its frame rate; give fps"),
+        (1.0, [], "does not say its frame rate; give fps, as in --fps 30"),
         (1.0, ["--fps", "50", "--side", "left"], "its fingers bend as a right hand's"),
         (1.0, ["--fps", "50", "--cutoff", "40"], "cut-off is 40.0 Hz"),
         (1.0, ["--fps", "50", "--sequence", "thumb"], "has no hand 'thumb'"),

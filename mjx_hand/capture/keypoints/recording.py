@@ -25,6 +25,7 @@ class KeypointRecording:
         side: "right", "left", or "" where the recording does not say.
         layout: name of the device's layout in `layouts.LAYOUTS`.
         source: provenance, one line.
+        warnings: what is doubtful about it, one line each.
     """
 
     fps: float | None
@@ -32,6 +33,7 @@ class KeypointRecording:
     side: str = static(default="")
     layout: str = static(default="mediapipe")
     source: str = static(default="")
+    warnings: tuple[str, ...] = static(default=())
 
     @property
     def num_frames(self) -> int:
@@ -68,7 +70,7 @@ def save_keypoints(recording: KeypointRecording, path: str | Path) -> None:
     """
     check_keypoints(recording)
     if recording.fps is None:
-        raise InputError(f"{recording.source or 'keypoints'}: the frame rate is not known; give fps")
+        raise InputError(f"{recording.source or 'keypoints'}: the frame rate is not known; give fps, as in fps=30")
     arrays = {
         "fps": recording.fps,
         "positions": recording.positions,
