@@ -10,6 +10,7 @@ import numpy as np
 
 from mjx_hand.capture.keypoint_files.load_keypoints import chosen, frames_seen
 from mjx_hand.capture.keypoint_files.reader import KeypointReader
+from mjx_hand.capture.keypoint_frames.one_hand import whole
 from mjx_hand.capture.keypoint_fit.fit import fit_keypoints
 from mjx_hand.capture.keypoints.layouts import KEYPOINTS
 from mjx_hand.capture.keypoints.recording import SIDES, KeypointRecording
@@ -42,11 +43,11 @@ def keypoint_facts(
         InputError: the file is not sound.
     """
     hands = reader.read(path, contents, None)
-    names = ("hands", ", ".join(f"{name} ({_seen(hand)})" for name, hand in hands.items()))
+    names = ("hands", ", ".join(f"{name} ({_seen(hands[name])})" for name in whole(hands)))
     try:
         found = chosen(path, hands, side, sequence)
     except InputError as error:
-        advised = [_advice(path, reader, contents, hands, None, name, fps)[1] for name in hands]
+        advised = [_advice(path, reader, contents, hands, None, name, fps)[1] for name in whole(hands)]
         reason = as_options(str(error).removeprefix(f"{path}: "))
         return (names, ("to read one", reason)), tuple(itertools.chain(*advised))
     problem, commands = _advice(path, reader, contents, hands, side, sequence, fps)

@@ -106,7 +106,8 @@ def test_real_recordings(recordings, capsys):
     text = info(capsys, leap / "confidence-37fps.npz")
     assert "right_28+right_30+right_31 (" in text
     assert "choose with --side or --sequence" in text
-    assert "found again as right_30, right_31" in info(capsys, leap / "confidence-37fps.npz", "--sequence", "right_31")
+    assert "found again as right_30, right_31" in info(capsys, leap / "confidence-37fps.npz", "--side", "right")
+    assert "393 at" in info(capsys, leap / "confidence-37fps.npz", "--sequence", "right_31")
     text = info(capsys, recordings / "dexmv_mustard" / "sequence.npz")
     assert "DexMV" in text
     assert "the subject's own joint centres" in text

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import mjx_hand
 from mjx_hand.capture.keypoints.layouts import KEYPOINTS
 from mjx_hand.cli.main import main
 from tests.capture.keypoints.grips import FPS, grip, keypoints_of
@@ -33,7 +34,7 @@ def without_tips(points: np.ndarray) -> list[dict]:
 
 def test_what_is_advised_for_keypoints_runs(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    straight = json.dumps([[[10 * k, 40 * f, 0] for f in range(5) for k in range(4)] + [[0, 0, 0]]] * 4)
+    straight = json.dumps([[[4000 * k, 0, 0] for k in range(21)]] * 4)
     np.savez(tmp_path / "no rate.npz", joints=HAND, side="right")
     np.savez(tmp_path / "both.npz", right=HAND, left=OTHER, fps=FPS)
     np.savez(tmp_path / "millimetres.npz", joints=1000 * HAND, fps=FPS)
@@ -70,7 +71,7 @@ def test_next_names_our_own_commands(tmp_path, capsys):
 
 
 def test_yaml_of_robots_and_marker_sets(tmp_path, capsys):
-    root = Path(main.__code__.co_filename).parents[1]
+    root = Path(mjx_hand.__file__).parent
     assert "description of a robot hand" in info(capsys, root / "robots" / "descriptions" / "allegro.yaml")
     assert "13: hand_top" in info(capsys, root / "capture" / "markers" / "glove13.yaml")
 
@@ -128,7 +129,7 @@ def test_hot3d_is_named(recordings, capsys):
         assert "timestamp_ns" in text
         assert "15 objects" in text
     assert "hand_model" in info(capsys, folder / "umetrack_hand_user_profile.json", status=2)
-    assert "metadata.json" in info(capsys, folder, status=2)
+    assert "instance.json, mano_hand_pose_trajectory.jsonl" in info(capsys, folder, status=2)
 
 
 def test_the_command_line_names_its_options(tmp_path, capsys):

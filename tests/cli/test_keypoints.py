@@ -31,7 +31,7 @@ def test_own_bones_are_kept(tmp_path):
 def test_real_recording(recordings, tmp_path, capsys):
     path = recordings / "leap_motion" / "confidence-37fps.npz"
     assert main(["keypoints", str(path), "--sequence", "right_31", "--out", str(tmp_path / "m.npz")]) == 0
-    assert "layout leap, a right hand (as recorded), 561 frames" in capsys.readouterr().out
+    assert "layout leap, a right hand (as recorded), 393 frames" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

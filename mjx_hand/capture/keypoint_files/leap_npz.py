@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from mjx_hand.capture.keypoint_files.reader import ARRAYS, KeypointReader
-from mjx_hand.capture.keypoint_frames.one_hand import found_again, name_of, never_at_once
+from mjx_hand.capture.keypoint_frames.one_hand import found_again, name_of, never_at_once, with_parts
 from mjx_hand.capture.keypoints.layouts import LAYOUTS, to_keypoints
 from mjx_hand.capture.keypoints.recording import KeypointRecording, check_keypoints
 from mjx_hand.capture.keypoints.size import unit_factor
@@ -39,7 +39,7 @@ def _read(path: Path, arrays: Any, unit: str | None) -> dict[str, KeypointRecord
             raise InputError(f"{path}: {name}_frame names frames beyond the {len(times)} of t; they count from 0")
         seen[name] = np.isin(np.arange(len(times)), rows[name])
     found = {}
-    for group in never_at_once(seen, sides):
+    for group in with_parts(never_at_once(seen, sides)):
         name = name_of(group)
         at = np.concatenate([rows[each] for each in group])
         points = np.concatenate([joints[each] for each in group])

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mjx_hand.capture.keypoint_files.reader import ARRAYS, CONTAINERS, TABLE, KeypointReader, keypoint_readers
-from mjx_hand.capture.keypoint_frames.one_hand import JOINED
+from mjx_hand.capture.keypoint_frames.one_hand import whole
 from mjx_hand.capture.keypoints.recording import KeypointRecording
 from mjx_hand.capture.keypoints.side import bent_side
 from mjx_hand.errors import InputError
@@ -103,17 +103,17 @@ def recognised(path: Path, contents: Any) -> KeypointReader | None:
 def chosen(
     path: Path, hands: dict[str, KeypointRecording], side: str | None, sequence: str | None
 ) -> KeypointRecording:
-    """The one hand that is meant. Hands that are hardly ever seen, which are mistakes of a tracker, do not count.
+    """The one hand that is meant. Parts of a hand that was lost and found again are chosen by name alone, and hands that are hardly ever seen, which are mistakes of a tracker, do not count.
 
     Raises:
         InputError: there are several and neither side nor name tells them apart, or none is of that side or name.
     """
-    names = ", ".join(hands)
     if sequence is not None:
-        name = next((name for name in hands if sequence in (name, *name.split(JOINED))), None)
-        if name is None:
-            raise InputError(f"{path}: has no hand {sequence[:60]!r}; it has {names}")
-        return hands[name]
+        if sequence not in hands:
+            raise InputError(f"{path}: has no hand {sequence[:60]!r}; it has {', '.join(hands)}")
+        return hands[sequence]
+    hands = {name: hands[name] for name in whole(hands)}
+    names = ", ".join(hands)
     if len(hands) == 1:
         return next(iter(hands.values()))
     mine = hands

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from mjx_hand.capture.keypoint_frames.frame_hand import IMAGE, WORLD, FrameHand
-from mjx_hand.capture.keypoint_frames.one_hand import found_again, name_of, never_at_once
+from mjx_hand.capture.keypoint_frames.one_hand import found_again, name_of, never_at_once, with_parts
 from mjx_hand.capture.keypoint_frames.tracks import tracks, usual
 from mjx_hand.capture.keypoints.names import counted_keypoints, named_keypoints
 from mjx_hand.capture.keypoints.recording import KeypointRecording, check_keypoints
@@ -80,7 +80,7 @@ def recordings(
     known = {name: side[name] or bent_side(seen.positions[track]) for name, track in indices.items()}
     there = {name: np.isin(np.arange(len(frames)), rows) for name, rows in at.items()}
     made = {}
-    for group in never_at_once(there, known):
+    for group in with_parts(never_at_once(there, known)):
         name = name_of(group)
         positions = np.full((len(frames), *seen.positions.shape[1:]), np.nan)
         for each in group:
@@ -110,7 +110,7 @@ def _seen(path: Path, frames: Sequence[Sequence[FrameHand]], layout: object) -> 
         listed = [(k, hand) for k, hand in listed if hand.form == WORLD]
     elif IMAGE in forms:
         raise InputError(
-            f"{path}: holds MediaPipe's landmarks of the image, which are shares of its width and height and no places; "
+            f"{path}: holds MediaPipe's landmarks of the image, which are shares of its width and height, no places; "
             "save the world landmarks (worldLandmarks, multi_hand_world_landmarks), which are metres"
         )
     if not listed:
@@ -118,9 +118,13 @@ def _seen(path: Path, frames: Sequence[Sequence[FrameHand]], layout: object) -> 
     kept, points, names = _stacked(path, listed)
     points[~np.isfinite(points)] = np.nan
     positions, name = named_keypoints(path, names, points) if names else counted_keypoints(path, points, layout)
-    lost = sorted({k for k, _ in listed} - {k for k, _ in kept})
-    left_out = (f"{len(listed) - len(kept)} hands left out that have other points than most, first in frame {lost[0]}",)
-    return _Seen([k for k, _ in kept], [hand for _, hand in kept], positions, name), left_out if lost else ()
+    seen = _Seen([k for k, _ in kept], [hand for _, hand in kept], positions, name)
+    lost = (
+        [k for k, hand in listed if not any(hand is other for other in seen.hands)] if len(kept) < len(listed) else []
+    )
+    if not lost:
+        return seen, ()
+    return seen, (f"{len(lost)} hands left out that have other points than most, first in frame {lost[0]}",)
 
 
 def _stacked(

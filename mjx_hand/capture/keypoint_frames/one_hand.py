@@ -1,6 +1,6 @@
 """Which hands of a recording are the same one: those that a tracker lost and found again."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Bool
@@ -33,9 +33,22 @@ def never_at_once(seen: Mapping[str, Bool[np.ndarray, "t"]], sides: Mapping[str,
     return groups
 
 
+def with_parts(groups: Sequence[Sequence[str]]) -> list[list[str]]:
+    """The groups, and after them each part of those that have several by itself."""
+    parts = [[name] for group in groups if len(group) > 1 for name in group]
+    return [*map(list, groups), *parts]
+
+
 def name_of(group: Sequence[str]) -> str:
-    """The name of a hand that was lost and found again: those of its parts, each of which serves to choose it."""
+    """The name of a hand that was lost and found again: those of its parts."""
     return JOINED.join(group)
+
+
+def whole(names: Iterable[str]) -> list[str]:
+    """Of such names those that are no part of another."""
+    listed = list(names)
+    parts = {part for name in listed if JOINED in name for part in name.split(JOINED)}
+    return [name for name in listed if name not in parts]
 
 
 def found_again(group: Sequence[str]) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from mjx_hand.errors import InputError
 from tests.capture.keypoints.grips import grip, keypoints_of
 
 HAND = keypoints_of(grip())[:30]
-OTHER = keypoints_of(grip("left"))[:30] - [0.3, 0.0, 0.0]
+OTHER = keypoints_of(grip("left"))[:30] - np.array([0.3, 0.0, 0.0])
 AXES = [f"{name}_{axis}" for name in KEYPOINTS for axis in "xyz"]
 
 

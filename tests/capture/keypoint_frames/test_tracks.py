@@ -11,7 +11,7 @@ from tests.capture.keypoints.grips import grip, keypoints_of
 
 FRAMES = 60
 RIGHT = keypoints_of(grip())
-LEFT = keypoints_of(grip("left")) + [0.0, 0.3, 0.0]
+LEFT = keypoints_of(grip("left")) + np.array([0.0, 0.3, 0.0])
 
 
 def written(tmp_path, frames: list) -> object:
@@ -54,7 +54,7 @@ def test_two_hands_under_one_label_in_some_frames(tmp_path):
 @pytest.mark.parametrize("first", [True, False])
 def test_a_false_second_detection_is_left_out_and_told(tmp_path, first):
     frames = [[RIGHT[k].tolist()] for k in range(FRAMES)]
-    ghost = (RIGHT[21] + [0.4, 0, 0]).tolist()
+    ghost = (RIGHT[21] + np.array([0.4, 0, 0])).tolist()
     frames[20] = [ghost, RIGHT[20].tolist()] if first else [RIGHT[20].tolist(), ghost]
     found = load_keypoints(written(tmp_path, [{"hands": hands} for hands in frames]))
     np.testing.assert_allclose(found.positions, RIGHT)
@@ -65,14 +65,14 @@ def test_a_false_second_detection_is_left_out_and_told(tmp_path, first):
 
 def test_a_false_second_hand_of_a_side_that_is_said(tmp_path):
     frames = [{"hands": [{"side": "right", "joints": RIGHT[k].tolist()}]} for k in range(FRAMES)]
-    frames[20]["hands"].append({"side": "right", "joints": (RIGHT[20] + [0.4, 0, 0]).tolist()})
+    frames[20]["hands"].append({"side": "right", "joints": (RIGHT[20] + np.array([0.4, 0, 0])).tolist()})
     found = load_keypoints(written(tmp_path, frames), side="right")
     np.testing.assert_allclose(found.positions, RIGHT)
     assert found.warnings
 
 
 def test_hands_of_two_people_are_told_apart_by_place(tmp_path):
-    far = RIGHT + [0.0, 0.0, 1.0]
+    far = RIGHT + np.array([0.0, 0.0, 1.0])
     frames = [{"hands": [h.tolist() for h in ((far[k], RIGHT[k]) if k % 3 else (RIGHT[k], far[k]))]} for k in range(60)]
     path = written(tmp_path, frames)
     with pytest.raises(InputError, match="holds 2 right hands"):
@@ -114,8 +114,11 @@ def test_a_hand_found_again_under_a_new_id(tmp_path):
     path.write_text(json.dumps(frames))
     expected = RIGHT.copy()
     expected[lost] = np.nan
-    for options in ({"side": "right"}, {"sequence": "right_12"}, {"sequence": "right_7+right_12"}):
+    for options in ({"side": "right"}, {"sequence": "right_7+right_12"}):
         found = load_keypoints(path, **options)
         np.testing.assert_allclose(found.positions, expected, atol=1e-9)
         assert found.warnings == ("right_7 was lost and found again as right_12; they are taken as one",)
     assert not load_keypoints(path, side="left").warnings
+    part = load_keypoints(path, sequence="right_12")
+    assert not part.warnings
+    assert np.isfinite(part.positions).all(axis=(1, 2)).sum() == FRAMES - 35
