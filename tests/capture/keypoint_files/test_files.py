@@ -225,7 +225,9 @@ def test_bad_files_say_what_is_wrong_in_one_line(tmp_path):
     (tmp_path / "cut.json").write_text('{"frames": [[')
     assert "not a readable .json file" in refused(tmp_path / "cut.json")
     (tmp_path / "other.json").write_text('{"frames": [{"temperature": 3}]}')
-    assert "no keypoint file that is known here, but frames" in refused(tmp_path / "other.json")
+    assert "no keypoint file that is known here, but an .json of frames (1 objects with temperature)" in refused(
+        tmp_path / "other.json"
+    )
     write_json(tmp_path / "ragged.json", [good[0].tolist(), good[1, :20].tolist()], fps=30)
     assert "frame 1 has 20 points where the first has 21" in refused(tmp_path / "ragged.json")
     lacking = [{k: v for k, v in named(LAYOUTS["webxr"], p, "list").items() if k != "thumb-tip"} for p in good]
