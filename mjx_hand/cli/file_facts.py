@@ -213,7 +213,8 @@ def _unknown(path: Path, contents: Mapping[str, Any]) -> FileFacts:
     if schema := schema_of(path):
         raise InputError(f"{path}: schema {schema[:60]}, which this version of mjx-hand does not read; make it again")
     raise InputError(
-        f"{path}: nothing that is known here, but {described_for_reading(path, contents)}; docs/datasets.md lists the rest"
+        f"{path}: nothing that is known here, but {described_for_reading(path, contents)}; "
+        "docs/datasets.md lists what else is read"
     )
 
 

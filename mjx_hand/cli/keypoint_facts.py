@@ -10,9 +10,10 @@ import numpy as np
 
 from mjx_hand.capture.keypoint_files.load_keypoints import chosen, frames_seen
 from mjx_hand.capture.keypoint_files.reader import KeypointReader
-from mjx_hand.capture.keypoint_frames.one_hand import whole
 from mjx_hand.capture.keypoint_fit.fit import fit_keypoints
+from mjx_hand.capture.keypoint_frames.one_hand import whole
 from mjx_hand.capture.keypoints.layouts import KEYPOINTS
+from mjx_hand.capture.keypoints.picture import picture_warning
 from mjx_hand.capture.keypoints.recording import SIDES, KeypointRecording
 from mjx_hand.capture.keypoints.side import known_side
 from mjx_hand.cli.facts_of import Facts, frames, share_missing
@@ -58,7 +59,8 @@ def keypoint_facts(
         if rate
         else ("frames", f"{found.num_frames}, at a rate that the file does not say")
     )
-    warnings = tuple(("warning", warning) for warning in found.warnings)
+    doubts = (*found.warnings, *picture_warning(found.positions))
+    warnings = tuple(("warning", doubt) for doubt in doubts)
     return (names, ("side", _side(found, side)), counted, *_points(found), *warnings, *refused), commands
 
 

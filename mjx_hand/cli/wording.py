@@ -1,4 +1,4 @@
-"""Messages in the command line's words: the library's name arguments, `side='right'`, and these options, `--side right`."""
+"""Messages in the command line's words: options (`--side right`) where the library names arguments (`side='right'`)."""
 
 import re
 

@@ -48,7 +48,7 @@ class Table:
                 cells.pop()
             if len(cells) != len(self.columns):
                 raise InputError(
-                    f"{self.path}: frame {k} has {len(cells)} cells of {len(self.columns)}; truncated, or another table's"
+                    f"{self.path}: frame {k} has {len(cells)} cells of {len(self.columns)}; truncated, or another table"
                 )
             found.append(cells)
         return found

@@ -60,7 +60,7 @@ def _named(value: Mapping[Any, Any], depth: int) -> str:
     for name, each in list(value.items())[:SHOWN]:
         if isinstance(each, Mapping) and depth < _DEEPEST:
             inner = f" ({_named(each, depth + 1)})" if each else ""
-        elif isinstance(each, list) and each and isinstance(each[0], Mapping) and depth < _DEEPEST:
+        elif isinstance(each, list) and each and each[0] and isinstance(each[0], Mapping) and depth < _DEEPEST:
             inner = f" ({len(each)} objects with {_named(each[0], depth + 1)})"
         elif isinstance(each, np.ndarray | Record | list | tuple):
             inner = f" {_short(each)}"

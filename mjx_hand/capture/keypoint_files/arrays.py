@@ -2,9 +2,9 @@
 
 In an `.npz`, a pickled dictionary, or, a lone array without a name, in an `.npy` or pickle. Names read: the points as
 `joints`, `keypoints`, `landmarks`, `positions` or `points`, any other name that speaks of them where there is one such
-array, or a hand each as `right` and `left`; `fps` or times as `t`, `time`, `times` or `timestamps`; `side`, `unit` (m, cm
-or mm), `layout` (a name in `layouts.LAYOUTS`) and `names` or `joint_names`, one a point. One frame (n, 3) and flat rows
-(T, 3 n) are read too.
+array, or a hand each as `right` and `left`; `fps` or times as `t`, `time`, `times` or `timestamps`; `side`, `unit` (m,
+cm or mm), `layout` (a name in `layouts.LAYOUTS`) and `names` or `joint_names`, one a point. One frame (n, 3) and flat
+rows (T, 3 n) are read too.
 """
 
 import re
@@ -91,7 +91,7 @@ def _read(path: Path, arrays: Any, unit: str | None) -> dict[str, KeypointRecord
             positions, layout = named_keypoints(path, [str(n) for n in np.atleast_1d(_lone(names))], points)
         rate = fps
         if rate is None and times is not None:
-            stamps = {times: _array(arrays[times])}
+            stamps = {times: np.asarray(_array(arrays[times]))}
             rate, positions = evenly(path, numbers(path, stamps, {times: (rows,)})[times], positions)
         side = side or (said("side", "hand") or "").lower()
         recording = KeypointRecording(fps=rate, positions=positions, side=side, layout=layout, source=path.name)

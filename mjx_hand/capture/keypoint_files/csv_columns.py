@@ -1,9 +1,9 @@
 """Keypoints as a table: a header of `NAME_x,NAME_y,NAME_z` columns (or `x0,y0,z0,x1,…`), one line a frame.
 
 A column `time`, `t` or `timestamp` gives the rate. Lines before the header may say `# fps: 30`, `# unit: mm`,
-`# side: left` or `# layout: leap_bones`. Names that begin with `left_` or `right_` belong to that hand; a column `hand`,
-`side` or `handedness` says which hand a line is of, and two hands of one time or frame are two lines. Empty cells and
-`nan` are gaps; columns that are none of these are passed over.
+`# side: left` or `# layout: leap_bones`. Names that begin with `left_` or `right_` belong to that hand; a column
+`hand`, `side` or `handedness` says which hand a line is of, and two hands of one time or frame are two lines. Empty
+cells and `nan` are gaps; columns that are none of these are passed over.
 """
 
 import re

@@ -46,7 +46,8 @@ def _read(path: Path, table: Any, unit: str | None) -> dict[str, KeypointRecordi
         raise InputError(f"{path}: columns repeat: {', '.join(repeated[:6])}; give each its own name")
     rows = table.rows()
     landmark, axes, hand = _place(table.columns, _LANDMARK), _axes(table.columns), hand_column(table.columns)
-    assert landmark is not None and axes is not None, "as recognised"
+    assert landmark is not None, "as recognised"
+    assert axes is not None, "as recognised"
     points = table.numbers(rows, axes)
     clocks = [k for k, cell in enumerate(table.columns) if is_clock(cell)]
     # Lines of one frame and hand, wherever they stand.

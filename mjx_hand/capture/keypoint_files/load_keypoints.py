@@ -8,6 +8,7 @@ import numpy as np
 
 from mjx_hand.capture.keypoint_files.reader import ARRAYS, CONTAINERS, TABLE, KeypointReader, keypoint_readers
 from mjx_hand.capture.keypoint_frames.one_hand import whole
+from mjx_hand.capture.keypoints.picture import picture_warning
 from mjx_hand.capture.keypoints.recording import KeypointRecording
 from mjx_hand.capture.keypoints.side import bent_side
 from mjx_hand.errors import InputError
@@ -54,7 +55,8 @@ def load_keypoints(
     recording = chosen(path, reader.read(path, contents, unit), side, sequence)
     if recording.fps is not None and fps not in (None, recording.fps):
         raise InputError(f"{path}: was recorded at {recording.fps:g} frames per second; leave out fps={fps:g}")
-    return replace(recording, fps=recording.fps or fps)
+    warnings = (*recording.warnings, *picture_warning(recording.positions))
+    return replace(recording, fps=recording.fps or fps, warnings=warnings)
 
 
 def is_keypoint_file(path: str | Path) -> bool:
@@ -103,7 +105,10 @@ def recognised(path: Path, contents: Any) -> KeypointReader | None:
 def chosen(
     path: Path, hands: dict[str, KeypointRecording], side: str | None, sequence: str | None
 ) -> KeypointRecording:
-    """The one hand that is meant. Parts of a hand that was lost and found again are chosen by name alone, and hands that are hardly ever seen, which are mistakes of a tracker, do not count.
+    """The one hand that is meant.
+
+    Parts of a hand that was lost and found again are chosen by name alone. Hands that are hardly ever seen, which are
+    mistakes of a tracker, do not count.
 
     Raises:
         InputError: there are several and neither side nor name tells them apart, or none is of that side or name.

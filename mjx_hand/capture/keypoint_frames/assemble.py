@@ -162,6 +162,11 @@ def timed_hand(
     source: str,
     warnings: tuple[str, ...] = (),
 ) -> KeypointRecording:
+    """The recording of keypoints (m; NaN where missing) in frames at these times.
+
+    Raises:
+        InputError: the times are not sound, or nothing was seen.
+    """
     fps = clock.rate
     if fps is None and clock.times is not None:
         fps, positions = evenly(path, clock.times, positions)

@@ -95,14 +95,14 @@ def _hands_of_object(value: dict[str, Any], said: _Said, depth: int) -> list[Fra
     if both:
         return both
     keys = {snake(key): key for key in value}
-    texts = [value[keys[name]].lower() for name in _SIDE if isinstance(value.get(keys.get(name)), str)]
+    texts = [value[keys[name]].lower() for name in _SIDE if name in keys and isinstance(value[keys[name]], str)]
     told = next((side for side in SIDES for text in texts if text.startswith(side)), "")
     said = _Said(told, told, said.form) if told else said
     handed = next((value[keys[name]] for name in _LABELS if name in keys), None)
     found = _landmarks_of(value, said, isinstance(handed, list | dict), depth)
     if not found and not has_world_landmarks(value):
-        names = (name for name in (*_HANDS, *POINTS) if isinstance(value.get(keys.get(name)), dict | list))
-        found = next((hands for name in names if (hands := _hands(value[keys[name]], said, depth + 1))), [])
+        inner = (value[keys[name]] for name in (*_HANDS, *POINTS) if name in keys)
+        found = next((hands for each in inner if (hands := _hands(each, said, depth + 1))), [])
     if "handyRevision" in value:  # handy.js (https://github.com/stewdio/handy.js) writes whole millimetres
         found = [dataclasses.replace(hand, unit="mm") for hand in found]
     labels = _labels(handed, 0)

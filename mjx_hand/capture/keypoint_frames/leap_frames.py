@@ -2,8 +2,8 @@
 
 A frame has `hands` and `pointables`, the fingers of all of them, in millimetres
 (https://developer-archive.leapmotion.com/documentation/javascript/api/Leap.Frame.html). The recorder
-(https://github.com/leapmotion/leapjs-playback) has three forms: frames with `tipPosition` and no `btipPosition`; packed,
-where the first row names what every other row holds; and either without a finger's `type`, which its id then tells.
+(https://github.com/leapmotion/leapjs-playback) has three forms: frames with `tipPosition` and no `btipPosition`;
+packed, where the first row names what every other row holds; and either without a finger's `type`, which its id tells.
 """
 
 from typing import Any
@@ -76,7 +76,7 @@ def _object(header: list[Any], row: Any) -> dict[str, Any] | None:
 
 def _type(finger: dict[str, Any]) -> int | None:
     """Which finger: as said, else by the last digit of its id."""
-    said = finger.get("type", finger.get("id"))
+    said: Any = finger.get("type", finger.get("id"))
     return int(said) % 10 if is_number(said) and abs(said) < 1e9 else None
 
 

@@ -11,7 +11,7 @@ from mjx_hand.capture.keypoints.layouts import LAYOUTS, NUM_KEYPOINTS, KeypointL
 from mjx_hand.capture.keypoints.orders import order_of
 from mjx_hand.errors import InputError
 
-# Bare arrays: how many points tell the layout. Leap's 26 with carpal ends must name itself; of 21, bones tell the order.
+# Bare arrays: how many points tell the layout, of 21 the bones. Leap's 26 with carpal ends must name itself.
 COUNTS = {len(layout.joints): layout for name, layout in reversed(LAYOUTS.items()) if name != "leap_bones"}
 
 _ENOUGH = 10  # joints of one layout by which a hand is recognised, even where some are missing

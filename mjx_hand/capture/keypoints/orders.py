@@ -1,14 +1,10 @@
 """In which of their orders 21 points without names stand: the one in which they have the bones of a hand."""
 
-from functools import cache
-
 import numpy as np
 from jaxtyping import Float
 
-from mjx_hand.capture.keypoints.bone_lengths import lengths
+from mjx_hand.capture.keypoints.bone_lengths import lengths, mean_lengths
 from mjx_hand.capture.keypoints.layouts import LAYOUTS, NUM_KEYPOINTS, KeypointLayout, to_keypoints
-from mjx_hand.capture.keypoints.skeleton import rest_keypoints
-from mjx_hand.hand.load import load_hand
 
 _ORDERS = ("mediapipe", "mano", "mano_index_first")  # the usual one first
 _CLEARLY = 0.5  # share of the usual order's misfit below which another one is it
@@ -33,14 +29,9 @@ def _misfit(keypoints: Float[np.ndarray, "t 21 3"]) -> float:
     """How far (as a logarithm) lengths are from the mean hand's, its size aside, in any frame; infinite if unknown."""
     seen = lengths(keypoints)
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.log(seen / _mean_lengths())
+        ratio = np.log(seen / mean_lengths())
     ratio[~np.isfinite(ratio)] = np.nan
     known = np.isfinite(ratio)
     if not known.any():
         return np.inf
     return float(np.abs(ratio - np.median(ratio[known]))[known].mean())
-
-
-@cache
-def _mean_lengths() -> Float[np.ndarray, "n"]:
-    return lengths(rest_keypoints(load_hand())[0])

@@ -23,7 +23,7 @@ def bend_towards_right(positions: Float[np.ndarray, "t 21 3"]) -> float:
     Seen along the knuckles from the little finger to the index finger, a right hand's fingers close
     counterclockwise and a left hand's clockwise: negative for a left hand, near zero for one held flat.
     """
-    return float(_mean(_outer_bends(positions).ravel()))
+    return float(_mean(_outer_bends(positions).reshape(1, -1))[0])
 
 
 def bends_towards_right(positions: Float[np.ndarray, "t 21 3"]) -> Float[np.ndarray, "t"]:
@@ -41,10 +41,10 @@ def _outer_bends(positions: Float[np.ndarray, "t 21 3"]) -> Float[np.ndarray, "t
     return np.arctan2(sine, cosine)
 
 
-def _mean(values: Float[np.ndarray, "*b n"]) -> Float[np.ndarray, "*b"] | np.floating:
+def _mean(values: Float[np.ndarray, "t n"]) -> Float[np.ndarray, "t"]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # the mean of nothing is NaN, as documented
-        return np.nanmean(values, axis=-1)
+        return np.asarray(np.nanmean(values, axis=-1))
 
 
 def bent_side(positions: Float[np.ndarray, "t 21 3"]) -> str:
@@ -79,7 +79,7 @@ def known_side(recording: KeypointRecording, asked: str | None = None) -> tuple[
         return said, "as asked" if asked else "as recorded"
     # A hand in left-handed axes is the other hand's mirror image in every way: nothing in it would tell.
     if recording.layout in _LEFT_HANDED:
-        how = f"as its fingers bend in right-handed axes; in Unity's, which {recording.layout} comes from, it is the other"
+        how = f"as its fingers bend in right-handed axes; in Unity's, as {recording.layout} often has, it is the other"
     else:
         how = "as its fingers bend"
     return seen, how

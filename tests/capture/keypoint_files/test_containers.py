@@ -1,6 +1,7 @@
 """Keypoints in everyday containers: lone and pickled arrays, long tables, tables with other columns."""
 
 import pickle
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,8 @@ def test_lone_and_pickled_arrays(tmp_path):
     (tmp_path / "lone.pkl").write_bytes(pickle.dumps(HAND))
     (tmp_path / "lists.pkl").write_bytes(pickle.dumps(HAND.tolist()))
     (tmp_path / "named.pkl").write_bytes(pickle.dumps({"hand_joints": 1000 * HAND, "fps": 30.0, "unit": "MM"}))
-    np.save(tmp_path / "named.npy", {"keypoints": HAND, "side": "Right"})
+    named: Any = {"keypoints": HAND, "side": "Right"}
+    np.save(tmp_path / "named.npy", named)
     np.savez(tmp_path / "capitals.npz", right_joints=HAND, fps=[30.0], unit=np.array(["M"]), side=b"Right")
     np.savez(tmp_path / "capitals.NPZ.npz", joints=HAND)
     (tmp_path / "capitals.NPZ.npz").rename(tmp_path / "capitals.NPZ")
@@ -43,7 +45,8 @@ def test_a_refusal_says_what_is_there(tmp_path):
 
     np.save(tmp_path / "turned.npy", HAND.transpose(0, 2, 1))
     assert "an array (30, 3, 21) of float64 without names; keypoints are 21 points" in refused("turned.npy")
-    np.save(tmp_path / "nested.npy", {"world_coord": {"joints.right": HAND}, "params": {"rot_r": np.zeros((30, 3))}})
+    nested: Any = {"world_coord": {"joints.right": HAND}, "params": {"rot_r": np.zeros((30, 3))}}
+    np.save(tmp_path / "nested.npy", nested)
     assert "world_coord (joints.right (30, 21, 3)), params (rot_r (30, 3))" in refused("nested.npy")
     np.savez(tmp_path / "beside.npz", joints=HAND, box_poses=np.zeros((30, 4, 4)))
     assert "joints (30, 21, 3), box_poses (30, 4, 4)" in refused("beside.npz")

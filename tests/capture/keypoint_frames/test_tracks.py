@@ -1,6 +1,8 @@
 """Hands stay themselves whatever a tracker's lists and labels say."""
 
 import json
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ RIGHT = keypoints_of(grip())
 LEFT = keypoints_of(grip("left")) + np.array([0.0, 0.3, 0.0])
 
 
-def written(tmp_path, frames: list) -> object:
+def written(tmp_path: Path, frames: list) -> Path:
     path = tmp_path / "in.json"
     path.write_text(json.dumps({"fps": 30, "frames": frames}))
     return path
@@ -114,7 +116,8 @@ def test_a_hand_found_again_under_a_new_id(tmp_path):
     path.write_text(json.dumps(frames))
     expected = RIGHT.copy()
     expected[lost] = np.nan
-    for options in ({"side": "right"}, {"sequence": "right_7+right_12"}):
+    choices: list[dict[str, Any]] = [{"side": "right"}, {"sequence": "right_7+right_12"}]
+    for options in choices:
         found = load_keypoints(path, **options)
         np.testing.assert_allclose(found.positions, expected, atol=1e-9)
         assert found.warnings == ("right_7 was lost and found again as right_12; they are taken as one",)
