@@ -15,6 +15,7 @@ from mjx_hand.files.input_file import check_input_file
 from mjx_hand.hand.load import load_hand
 from mjx_hand.hand.model import HandModel
 from mjx_hand.motion import Motion
+from mjx_hand.motion.plausibility.motions import plausible_motion
 
 _MARKER_FILES = (".c3d", ".trc", ".tsv")
 
@@ -42,15 +43,15 @@ def load_motion(
 
     Raises:
         InputError: there is no such file, no format recognises it, its contents are not sound, or it is not what was
-            asked for.
+            asked for, or no hand moves so (`mjx_hand.motion.plausibility`).
     """
     path = Path(path)
     if side not in (None, "right", "left"):
         raise InputError(f"side is {side!r}; give 'right' or 'left'")
     if markers is not None:
-        if sequence is not None or fps is not None:
-            raise InputError(f"{path}: marker files hold one recording and its rate; leave out sequence= and fps=")
-        return _fitted(path, markers, load_hand(mano, side or "right"))
+        if sequence is not None:
+            raise InputError(f"{path}: marker files hold one recording; leave out sequence=")
+        return _fitted(path, markers, load_hand(mano, side or "right"), fps)
     request = Request(
         side=side,
         sequence=sequence,
@@ -63,14 +64,15 @@ def load_motion(
     formats = dataset_formats()
     for known in formats:
         if known.recognises(path, contents):
-            return _asked_for(path, known, request, known.read(path, contents, request))
+            motion = _asked_for(path, known, request, known.read(path, contents, request))
+            return plausible_motion(motion, name=str(path))
     raise InputError(f"{path}: not a recording that is known here, but {_found(path, contents)}")
 
 
-def _fitted(path: Path, markers: str | Path, hand: HandModel) -> Motion:
+def _fitted(path: Path, markers: str | Path, hand: HandModel, fps: float | None) -> Motion:
     """The motion of the hand that wears these markers."""
     marker_set = load_marker_set(markers, hand)
-    recording = match_labels(load_markers(path), marker_set).recording
+    recording = match_labels(load_markers(path, fps=fps), marker_set).recording
     return fit_markers(fill_short_gaps(recording, FILL), hand, marker_set)[0]
 
 

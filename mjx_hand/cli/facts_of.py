@@ -17,6 +17,7 @@ from mjx_hand.robots.robot_motion import RobotMotion
 
 Facts = tuple[tuple[str, str], ...]
 
+MOST_STARTS = 16  # of labels that are tried as a prefix: more are not people, but other words
 BIGGEST_ROOM = 30.0  # m; what is bigger is in another unit
 
 
@@ -29,6 +30,7 @@ def motion(found: Motion) -> Facts:
         ("units", "metres, radians, seconds; quaternions wxyz"),
         ("wrist", _travel(found.wrist_position[found.valid])),
         ("source", found.source or "not said"),
+        *_warnings(found.warnings),
     )
 
 
@@ -41,6 +43,7 @@ def joint_motion(found: JointMotion) -> Facts:
         ("units", "radians, metres, seconds; quaternions wxyz"),
         ("wrist", _travel(found.wrist_position)),
         ("source", found.source or "not said"),
+        *_warnings(found.warnings),
     )
 
 
@@ -53,6 +56,7 @@ def robot_motion(found: RobotMotion) -> Facts:
         ("units", "radians, metres, seconds; quaternions wxyz"),
         ("base", _travel(found.base_position)),
         ("source", found.source or "not said"),
+        *_warnings(found.warnings),
     )
 
 
@@ -72,9 +76,9 @@ def demonstration(found: Demonstration) -> Facts:
     )
 
 
-def markers(path: Path, units: str | None = None) -> tuple[Facts, str]:
+def markers(path: Path, units: str | None = None, fps: float | None = None) -> tuple[Facts, str]:
     """Of a marker recording: what is in it, and the options of `mjx-hand fit` that suit it best."""
-    found = load_markers(path, units)
+    found = load_markers(path, units, fps)
     suits, options = _suitable_set(found)
     missing = 1 - found.visible.mean(axis=0)
     worst = np.argsort(-missing)[:3]
@@ -89,7 +93,8 @@ def markers(path: Path, units: str | None = None) -> tuple[Facts, str]:
         ("units", f"metres, from the file's {units if units else 'own unit'}"),
         ("extent", f"{' x '.join(f'{e:.3g}' for e in extent)} m over all frames{doubt}"),
         ("marker set", suits),
-    ), options + (f" --units {units}" if units else "")
+        *_warnings(found.warnings),
+    ), options + (f" --units {units}" if units else "") + (f" --fps {fps:g}" if fps else "")
 
 
 def _suitable_set(found: MarkerRecording) -> tuple[str, str]:
@@ -99,7 +104,7 @@ def _suitable_set(found: MarkerRecording) -> tuple[str, str]:
     for name in INCLUDED:
         marker_set = included_marker_set(hand, name)
         starts = label_starts(found.names, marker_set)
-        for start in ("", *starts):
+        for start in ("", *starts[:MOST_STARTS]):
             try:
                 share = len(match_labels(found, marker_set, start).recording.names) / len(marker_set.names)
             except InputError:  # none of its labels, or two hands
@@ -157,6 +162,10 @@ def robot(path: Path) -> tuple[str, Facts]:
             ("joints", str(joints)),
         )
     raise InputError(f"{path}: XML of {root.tag!r}, neither a URDF (robot) nor an MJCF (mujoco)")
+
+
+def _warnings(warnings: tuple[str, ...]) -> Facts:
+    return tuple(("warning", warning) for warning in warnings)
 
 
 def frames(count: int, fps: float) -> tuple[str, str]:

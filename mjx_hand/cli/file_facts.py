@@ -10,7 +10,7 @@ from mjx_hand.capture.datasets.dataset_format import dataset_formats
 from mjx_hand.capture.datasets.keypoints import FORMAT as KEYPOINTS
 from mjx_hand.capture.keypoint_files.load_keypoints import keypoint_contents, recognised
 from mjx_hand.capture.load import load_motion
-from mjx_hand.capture.marker_files.marker_format import marker_formats
+from mjx_hand.capture.marker_files.load_markers import marker_format_of
 from mjx_hand.capture.markers.marker_recording import SCHEMA as MARKERS
 from mjx_hand.capture.unread import described_for_reading
 from mjx_hand.cli import facts_of
@@ -69,7 +69,7 @@ def file_facts(
     """
     if not path.is_dir():
         check_input_file(path, "give the path of a recording, a hand or a robot description")
-    own = _own(path, units) or _robot(path) or yaml_facts(path)
+    own = _own(path, units, fps) or _robot(path) or yaml_facts(path)
     if own is not None:
         return own if isinstance(own, FileFacts) else FileFacts(*own)
     contents = read_contents(path)
@@ -77,14 +77,14 @@ def file_facts(
         _keypoints(path, contents, side, sequence, fps)
         or _motion(path, contents, side, sequence, mano, fps)
         or _mano(path, contents)
-        or _markers(path, units)
+        or _markers(path, units, fps)
         or _video(path)
         or _folder(path)
         or _unknown(path, contents)
     )
 
 
-def _own(path: Path, units: str | None) -> FileFacts | None:
+def _own(path: Path, units: str | None, fps: float | None) -> FileFacts | None:
     """Joint motions, of robots too, and demonstrations; motions, markers, keypoints are found among the recordings."""
     schema = schema_of(path)
     view = (f"mjx-hand view {_quoted(path)}",)
@@ -96,7 +96,7 @@ def _own(path: Path, units: str | None) -> FileFacts | None:
         load = f"in Python: mjx_hand.robots.robot_motion.load_robot_motion({str(path)!r})"
         return FileFacts(f"robot motion ({schema})", facts_of.robot_motion(load_robot_motion(path)), (load,))
     if schema == MARKERS:
-        return _marker_facts(path, f"markers ({schema})", units)
+        return _marker_facts(path, f"markers ({schema})", units, fps)
     return None
 
 
@@ -152,12 +152,14 @@ def _mano(path: Path, contents: Mapping[str, Any]) -> FileFacts | None:
     return FileFacts("MANO hand", facts, (f"mjx-hand build --out my_hand --side {side} --mano {_quoted(path)}",))
 
 
-def _markers(path: Path, units: str | None) -> FileFacts | None:
-    known = next((f for f in marker_formats() if path.suffix.lower() in f.suffixes and path.suffix != ".npz"), None)
-    if known is None or not path.is_file():
+def _markers(path: Path, units: str | None, fps: float | None) -> FileFacts | None:
+    if not path.is_file() or path.suffix.lower() == ".npz":
+        return None
+    known = marker_format_of(path)
+    if known is None:
         return None
     try:
-        return _marker_facts(path, known.name, units)
+        return _marker_facts(path, known.name, units, fps)
     except InputError as error:
         if path.suffix.lower() != ".csv":
             raise
@@ -166,8 +168,8 @@ def _markers(path: Path, units: str | None) -> FileFacts | None:
         raise InputError(f"{path}: {described_for_reading(path, {})}; as markers: {reason}"[:600]) from None
 
 
-def _marker_facts(path: Path, kind: str, units: str | None) -> FileFacts:
-    facts, options = facts_of.markers(path, units)
+def _marker_facts(path: Path, kind: str, units: str | None, fps: float | None) -> FileFacts:
+    facts, options = facts_of.markers(path, units, fps)
     out = _quoted(f"{path.with_suffix('').name}.motion.npz")
     return FileFacts(kind, facts, (f"mjx-hand fit {_quoted(path)} {options} --out {out}",))
 

@@ -13,7 +13,9 @@ from mjx_hand.capture.keypoint_files.reader import KeypointReader
 from mjx_hand.capture.keypoint_fit.fit import fit_keypoints
 from mjx_hand.capture.keypoint_frames.one_hand import whole
 from mjx_hand.capture.keypoints.layouts import KEYPOINTS
-from mjx_hand.capture.keypoints.picture import picture_warning
+    findings = map(str, keypoint_findings(replace(found, fps=rate), load_hand()))
+    doubts = dict.fromkeys((*found.warnings, *picture_warning(found.positions), *findings))
+    warnings = tuple(("warning", doubt) for doubt in doubts)
 from mjx_hand.capture.keypoints.recording import SIDES, KeypointRecording
 from mjx_hand.capture.keypoints.side import known_side
 from mjx_hand.cli.facts_of import Facts, frames, share_missing
@@ -59,7 +61,9 @@ def keypoint_facts(
         if rate
         else ("frames", f"{found.num_frames}, at a rate that the file does not say")
     )
-    doubts = (*found.warnings, *picture_warning(found.positions))
+    findings = map(str, keypoint_findings(replace(found, fps=rate), load_hand()))
+    doubts = dict.fromkeys((*found.warnings, *picture_warning(found.positions), *findings))
+    warnings = tuple(("warning", doubt) for doubt in doubts)
     warnings = tuple(("warning", doubt) for doubt in doubts)
     return (names, ("side", _side(found, side)), counted, *_points(found), *warnings, *refused), commands
 

@@ -11,7 +11,7 @@ from mjx_hand.capture.keypoint_fit.fit import KeypointSettings, fit_keypoints
 from mjx_hand.capture.keypoint_fit.report import KeypointReport
 from mjx_hand.capture.keypoints.layouts import DIGITS
 from mjx_hand.capture.keypoints.side import known_side
-from mjx_hand.cli.output import check_out, print_table
+from mjx_hand.cli.output import check_out, print_table, print_warnings
 from mjx_hand.hand.joints import FINGERS
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion import Motion, save_motion
@@ -51,9 +51,8 @@ def keypoints(
     print(
         f"{found.source}: layout {found.layout}, a {which} hand ({how}), {motion.num_frames} frames at {motion.fps:g}/s"
     )
-    for warning in found.warnings:
-        print(f"warning: {warning}")
     _report(motion, report, gaps)
+    print_warnings(motion.warnings)
     print(f"{out}  turn it into joint angles with: mjx-hand retarget {out} --out angles.npz")
 
 

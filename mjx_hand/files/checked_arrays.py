@@ -51,6 +51,11 @@ def numbers(
     return found
 
 
+def texts(arrays: Mapping[str, np.ndarray], name: str) -> tuple[str, ...]:
+    """The strings of that name; none where it is missing."""
+    return tuple(str(each) for each in np.ravel(arrays[name])) if name in arrays else ()
+
+
 def text(path: str | Path, arrays: Mapping[str, np.ndarray], name: str) -> str:
     """The string of that name.
 

@@ -64,6 +64,14 @@ class Table:
         table[~np.isfinite(table)] = np.nan
         return table
 
+    def stamps(self, rows: Sequence[Sequence[str]], column: int) -> Float[np.ndarray, "t"]:
+        """One column of `rows` as numbers, infinity too.
+
+        Raises:
+            InputError: a cell is no number.
+        """
+        return np.array([self._number(k, row[column]) for k, row in enumerate(rows)], float)
+
     def _number(self, row: int, cell: str) -> float:
         if cell.lower() in _MISSING:
             return np.nan

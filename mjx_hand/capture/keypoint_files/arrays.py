@@ -2,12 +2,13 @@
 
 In an `.npz`, a pickled dictionary, or, a lone array without a name, in an `.npy` or pickle. Names read: the points as
 `joints`, `keypoints`, `landmarks`, `positions` or `points`, any other name that speaks of them where there is one such
-array, or a hand each as `right` and `left`; `fps` or times as `t`, `time`, `times` or `timestamps`; `side`, `unit` (m,
-cm or mm), `layout` (a name in `layouts.LAYOUTS`) and `names` or `joint_names`, one a point. One frame (n, 3) and flat
-rows (T, 3 n) are read too.
+array, or a hand each as `right` and `left`; `fps`, times as `t`, `time` or `timestamp` (`_ms` says a unit), frame
+numbers as `frame`; `side`, `unit` (m, cm or mm), `layout` (a name in `layouts.LAYOUTS`) and `names` or `joint_names`,
+one a point. One frame (n, 3) and flat rows (T, 3 n) are read too.
 """
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,25 +16,27 @@ import numpy as np
 
 from mjx_hand.capture.keypoint_files.reader import ARRAYS, KeypointReader
 from mjx_hand.capture.keypoint_frames.json_hands import side_of, snake
+from mjx_hand.capture.keypoint_frames.timed_hand import timed_hand
 from mjx_hand.capture.keypoints.names import COUNTS, counted_keypoints, named_keypoints
-from mjx_hand.capture.keypoints.recording import SIDES, KeypointRecording, check_keypoints
+from mjx_hand.capture.keypoints.recording import SIDES, KeypointRecording
 from mjx_hand.capture.keypoints.size import unit_factor
-from mjx_hand.capture.keypoints.times import evenly, stated_rate
+from mjx_hand.capture.timeline.clock_names import names_numbers, names_time
+from mjx_hand.capture.timeline.compare_clocks import stated_rate, timeline_of
+from mjx_hand.capture.timeline.timeline import Timeline
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import numbers
 from mjx_hand.files.contents import WHOLE, plain
 from mjx_hand.files.safe_pickle import Record
 
 _POINTS = ("joints", "keypoints", "landmarks", "positions", "points")
-_TIMES = ("t", "time", "times", "timestamps")
 _NAMES = ("names", "joint_names")
-_BESIDE = {*_TIMES, *_NAMES, "fps", "frame_rate", "side", "hand", "unit", "units", "layout", "source"}
+_BESIDE = {*_NAMES, "fps", "frame_rate", "side", "hand", "unit", "units", "layout", "source"}
 _SPEAKS = re.compile(r"joint|keypoint|landmark|kpt|kps|position|point|skeleton|hand|xyz", re.IGNORECASE)
 
 
 def _points_in(arrays: Any) -> dict[str, str]:
     """The names of the arrays that are hands' points, and the side that each names or ""."""
-    others = [name for name in arrays if name not in _BESIDE]
+    others = [n for n in arrays if n not in _BESIDE and not names_time(str(n)) and not names_numbers(str(n))]
     sides = {name: side_of(re.sub(r"_?(joints|keypoints|landmarks)_?", "", snake(str(name)))) for name in others}
     known = [name for name in others if name in _POINTS or name == WHOLE or sides[name]]
     if not known and len(others) == 1 and _SPEAKS.search(str(others[0])):
@@ -75,9 +78,6 @@ def _read(path: Path, arrays: Any, unit: str | None) -> dict[str, KeypointRecord
 
     factor = unit_factor(str(path), unit or said("unit", "units") or "m")
     names = next((arrays[key] for key in _NAMES if key in arrays), None)
-    rate = next((arrays[key] for key in ("fps", "frame_rate") if key in arrays), None)
-    fps = None if rate is None else stated_rate(path, "fps", _lone(rate))
-    times = next((key for key in _TIMES if key in arrays), None)
     found = {}
     for name, side in _points_in(arrays).items():
         array = _array(arrays[name])
@@ -89,14 +89,31 @@ def _read(path: Path, arrays: Any, unit: str | None) -> dict[str, KeypointRecord
             positions, layout = counted_keypoints(path, points, said("layout"))
         else:
             positions, layout = named_keypoints(path, [str(n) for n in np.atleast_1d(_lone(names))], points)
-        rate = fps
-        if rate is None and times is not None:
-            stamps = {times: np.asarray(_array(arrays[times]))}
-            rate, positions = evenly(path, numbers(path, stamps, {times: (rows,)})[times], positions)
         side = side or (said("side", "hand") or "").lower()
-        recording = KeypointRecording(fps=rate, positions=positions, side=side, layout=layout, source=path.name)
-        found[side if side in SIDES else str(name) or "hand"] = check_keypoints(recording)
+        found[side if side in SIDES else str(name) or "hand"] = timed_hand(
+            path, positions, _timeline(path, arrays, rows), side=side, layout=layout
+        )
     return found
+
+
+def _timeline(path: Path, arrays: Any, rows: int) -> Timeline:
+    def stamps(named: Callable[[str], bool]) -> tuple[str, np.ndarray | None]:
+        key = next((key for key in arrays if named(str(key))), None)
+        if key is None:
+            return "", None
+        array = {str(key): np.asarray(_array(arrays[key]))}
+        return str(key), numbers(path, array, {str(key): (rows,)}, finite=False)[str(key)].astype(float)
+
+    rate = next((arrays[key] for key in ("fps", "frame_rate") if key in arrays), None)
+    name, times = stamps(names_time)
+    return timeline_of(
+        path,
+        rows,
+        rate=None if rate is None else stated_rate(path, "fps", _lone(rate)),
+        times=times,
+        name=name,
+        numbers=stamps(names_numbers)[1],
+    )
 
 
 def _lone(value: Any) -> Any:

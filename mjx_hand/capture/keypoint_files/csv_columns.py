@@ -1,9 +1,9 @@
 """Keypoints as a table: a header of `NAME_x,NAME_y,NAME_z` columns (or `x0,y0,z0,x1,…`), one line a frame.
 
-A column `time`, `t` or `timestamp` gives the rate. Lines before the header may say `# fps: 30`, `# unit: mm`,
-`# side: left` or `# layout: leap_bones`. Names that begin with `left_` or `right_` belong to that hand; a column
-`hand`, `side` or `handedness` says which hand a line is of, and two hands of one time or frame are two lines. Empty
-cells and `nan` are gaps; columns that are none of these are passed over.
+Columns `time`, `t` or `timestamp` (`time_ms` says a unit) and `frame` say when lines were taken. Lines before the
+header may say `# fps: 30`, `# unit: mm`, `# side: left` or `# layout: leap_bones`. Names that begin with `left_` or
+`right_` belong to that hand; a column `hand`, `side` or `handedness` says which hand a line is of, and two hands of one
+time or frame are two lines. Empty cells and `nan` are gaps; columns that are none of these are passed over.
 """
 
 import re
@@ -78,8 +78,8 @@ def _read(path: Path, table: Any, unit: str | None) -> dict[str, KeypointRecordi
         for row, own, place in zip(rows, listed, points.reshape(len(rows), len(names), 3), strict=True):
             which, name = (side, side) if side or label is None else hand_in(table.columns[label], row[label])
             own.append(FrameHand(place, told, which, name))
-    frames, clock = frames_of_rows(path, table, rows, listed)
-    return recordings(path, frames, clock, table.said, unit)
+    frames, timeline = frames_of_rows(path, table, rows, listed)
+    return recordings(path, frames, timeline, table.said, unit)
 
 
 READER = KeypointReader(

@@ -73,8 +73,8 @@ def _read(path: Path, table: Any, unit: str | None) -> dict[str, KeypointRecordi
             places = points[list(own.values())]
         listed.append([FrameHand(places, () if numbered else tuple(own), side, name)])
         first.append(row)
-    frames, clock = frames_of_rows(path, table, first, listed)
-    return recordings(path, frames, clock, table.said, unit)
+    frames, timeline = frames_of_rows(path, table, first, listed)
+    return recordings(path, frames, timeline, table.said, unit)
 
 
 READER = KeypointReader(

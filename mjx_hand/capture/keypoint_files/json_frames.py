@@ -2,25 +2,27 @@
 one frame alone.
 
 `json_hands` has the forms that a frame may have, `frame_lists` where the frames stand. A frame's `time`, `timestamp` or
-`t` gives the rate where `fps` is not said; a frame that is null or empty is a gap.
+`t` (`timestamp_ms` says a unit) and its `frame` number are compared with the rate; a frame that is null or empty is a
+gap.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mjx_hand.capture.keypoint_files.reader import VALUE, KeypointReader
-from mjx_hand.capture.keypoint_frames.assemble import Clock, recordings
+from mjx_hand.capture.keypoint_frames.assemble import recordings
 from mjx_hand.capture.keypoint_frames.frame_lists import frames_in
 from mjx_hand.capture.keypoint_frames.json_hands import frame_hands, has_world_landmarks
-from mjx_hand.capture.keypoint_frames.json_points import is_number
 from mjx_hand.capture.keypoint_frames.leap_frames import is_leap_frame
 from mjx_hand.capture.keypoints.recording import KeypointRecording
-from mjx_hand.capture.keypoints.times import stated_rate
+from mjx_hand.capture.timeline.clock_names import names_numbers, names_time
+from mjx_hand.capture.timeline.compare_clocks import LATEST, stated_rate, timeline_of
+from mjx_hand.capture.timeline.timeline import Timeline
 from mjx_hand.errors import InputError
 
-_TIMES = ("time", "timestamp", "t", "timestamp_ms", "time_ms")
 _RATES = ("fps", "frame_rate", "frameRate", "rate")
 
 
@@ -31,18 +33,49 @@ def _recognises(value: Any) -> bool:
 
 def _read(path: Path, value: Any, unit: str | None) -> dict[str, KeypointRecording]:
     frames, said = frames_in(value)
-    return recordings(path, [frame_hands(frame) for frame in frames], _clock(path, said, frames), said, unit)
+    rows, timeline = _timeline(path, said, frames)
+    return recordings(path, [frame_hands(frames[k]) for k in rows], timeline, said, unit)
 
 
-def _clock(path: Path, said: dict[str, Any], frames: list[Any]) -> Clock:
-    times = [next((frame[key] for key in _TIMES if key in frame), None) for frame in frames if isinstance(frame, dict)]
+def _timeline(path: Path, said: dict[str, Any], frames: list[Any]) -> tuple[np.ndarray, Timeline]:
+    """The rows that count, and when they were taken. A null between frames that have times says nothing itself."""
+    times, name = _stamps(path, frames, names_time, "time")
+    numbers, _ = _stamps(path, frames, names_numbers, "number")
     rate = next((stated_rate(path, key, said[key]) for key in _RATES if said.get(key) is not None), None)
-    separate = any(isinstance(frame, dict) and "handyRevision" in frame for frame in frames)  # postures, no motion
-    if rate is not None or separate or len(times) < len(frames) or None in times:
-        return Clock(rate=rate)
-    if not all(is_number(each) for each in times):
-        raise InputError(f"{path}: a frame's time is {str(times[0])[:40]!r}, expected a number of seconds")
-    return Clock(times=np.array(times, float))
+    if any(isinstance(frame, dict) and "handyRevision" in frame for frame in frames):
+        times = None  # of separate postures, no motion
+    stamps = times if times is not None else numbers
+    rows = np.arange(len(frames))
+    if stamps is not None:
+        rows = np.array([k for k, frame in enumerate(frames) if frame])
+    return rows, timeline_of(
+        path,
+        len(rows),
+        rate=rate,
+        times=None if times is None else times[rows],
+        name=name,
+        numbers=None if numbers is None else numbers[rows],
+    )
+
+
+def _stamps(path: Path, frames: list[Any], named: Callable[[str], bool], what: str) -> tuple[np.ndarray | None, str]:
+    """Each frame's time or number, NaN for frames that are null, and what it is called; None where a frame lacks it."""
+    stamps, name = np.full(len(frames), np.nan), ""
+    for k, frame in enumerate(frames):
+        if not frame:
+            continue
+        keys = [key for key in frame if named(key) and _alone(frame[key])] if isinstance(frame, dict) else []
+        if not keys:
+            return None, ""
+        name, value = keys[0], frame[keys[0]]
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise InputError(f"{path}: a frame's {what} is {value!r}, expected a number"[:300])
+        stamps[k] = float(value) if abs(value) < LATEST else np.inf
+    return stamps, name
+
+
+def _alone(value: Any) -> bool:
+    return value is not None and not isinstance(value, dict | list)
 
 
 READER = KeypointReader(

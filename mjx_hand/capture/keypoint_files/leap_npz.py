@@ -14,10 +14,11 @@ import numpy as np
 
 from mjx_hand.capture.keypoint_files.reader import ARRAYS, KeypointReader
 from mjx_hand.capture.keypoint_frames.one_hand import found_again, name_of, never_at_once, with_parts
+from mjx_hand.capture.keypoint_frames.timed_hand import timed_hand
 from mjx_hand.capture.keypoints.layouts import LAYOUTS, to_keypoints
-from mjx_hand.capture.keypoints.recording import KeypointRecording, check_keypoints
+from mjx_hand.capture.keypoints.recording import KeypointRecording
 from mjx_hand.capture.keypoints.size import unit_factor
-from mjx_hand.capture.keypoints.times import evenly
+from mjx_hand.capture.timeline.compare_clocks import timeline_of
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import numbers
 
@@ -45,16 +46,15 @@ def _read(path: Path, arrays: Any, unit: str | None) -> dict[str, KeypointRecord
         points = np.concatenate([joints[each] for each in group])
         points = np.where(np.isfinite(points), points, np.nan) * unit_factor(str(path), unit or "mm")
         order = np.argsort(at, kind="stable")
-        fps, points = evenly(path, times[at[order]], points[order])
-        recording = KeypointRecording(
-            fps=fps,
-            positions=to_keypoints(points.reshape(len(points), 20, 3), LAYOUTS["leap"]),
+        found[name] = timed_hand(
+            path,
+            to_keypoints(points[order].reshape(-1, 20, 3), LAYOUTS["leap"]),
+            timeline_of(path, len(at), times=times[at[order]], name="t"),
             side=sides[group[0]],
             layout="leap",
             source=f"{path.name} {name}",
             warnings=found_again(group),
         )
-        found[name] = check_keypoints(recording)
     return found
 
 

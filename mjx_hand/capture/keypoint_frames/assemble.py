@@ -10,33 +10,17 @@ from jaxtyping import Float
 
 from mjx_hand.capture.keypoint_frames.frame_hand import IMAGE, WORLD, FrameHand
 from mjx_hand.capture.keypoint_frames.one_hand import found_again, name_of, never_at_once, with_parts
+from mjx_hand.capture.keypoint_frames.timed_hand import timed_hand
 from mjx_hand.capture.keypoint_frames.tracks import tracks, usual
 from mjx_hand.capture.keypoints.names import counted_keypoints, named_keypoints
-from mjx_hand.capture.keypoints.recording import KeypointRecording, check_keypoints
+from mjx_hand.capture.keypoints.recording import KeypointRecording
 from mjx_hand.capture.keypoints.side import bent_side
 from mjx_hand.capture.keypoints.size import unit_factor
-from mjx_hand.capture.keypoints.times import evenly
+from mjx_hand.capture.timeline.timeline import Timeline
 from mjx_hand.errors import InputError
 
 Array = np.ndarray
 FEW_BROKEN = 0.1  # share of the hands seen that may have another number of points, and are left out
-
-
-@dataclass(frozen=True)
-class Clock:
-    """What a file says of when its frames were taken.
-
-    Attributes:
-        rate: frames per second.
-        times: of the frames, in any unit.
-        name: of the times in the file.
-        numbers: of the frames.
-    """
-
-    rate: float | None = None
-    times: Float[Array, "t"] | None = None
-    name: str = "time"
-    numbers: Float[Array, "t"] | None = None
 
 
 @dataclass(frozen=True)
@@ -50,7 +34,7 @@ class _Seen:
 
 
 def recordings(
-    path: Path, frames: Sequence[Sequence[FrameHand]], clock: Clock, said: Mapping[str, Any], unit: str | None
+    path: Path, frames: Sequence[Sequence[FrameHand]], timeline: Timeline, said: Mapping[str, Any], unit: str | None
 ) -> dict[str, KeypointRecording]:
     """A recording for each hand that is in the frames, by its name in the file.
 
@@ -60,7 +44,7 @@ def recordings(
     Args:
         path: of the file.
         frames: the hands in each frame.
-        clock: when they were taken.
+        timeline: when they were taken.
         said: what else the file says of all of them: `side`, `unit`, `layout`.
         unit: what the caller says, or None.
 
@@ -70,7 +54,8 @@ def recordings(
     seen, warnings = _seen(path, frames, said.get("layout"))
     scale = unit_factor(str(path), unit or said.get("unit") or seen.hands[0].unit or "m")
     sides, labels = [hand.side for hand in seen.hands], [hand.label for hand in seen.hands]
-    found = tracks(seen.frames, sides, labels, seen.positions)
+    lost = (seen.positions == 0).all(axis=-1, keepdims=True)  # places that would lead astray
+    found = tracks(seen.frames, sides, labels, np.where(lost, np.nan, seen.positions))
     names = _names([usual([labels[k] for k in track]) for track in found])
     indices = dict(zip(names, found, strict=True))
     side = {name: usual([sides[k] for k in track]) for name, track in indices.items()}
@@ -87,7 +72,15 @@ def recordings(
             positions[at[each]] = seen.positions[indices[each]]
         told = (*warnings, *found_again(group))
         source = path.name if len(found) == 1 else f"{path.name} {name}"
-        made[name] = timed_hand(path, scale * positions, clock, side[group[0]], seen.layout, source, told)
+        made[name] = timed_hand(
+            path,
+            scale * positions,
+            timeline,
+            side=side[group[0]],
+            layout=seen.layout,
+            source=source,
+            warnings=told,
+        )
     return made
 
 
@@ -151,25 +144,3 @@ def _stacked(
             named_keypoints(path, hand.names, hand.points)  # says which joint is there twice
         points[k, [row[name] for name in hand.names]] = hand.points
     return kept, points, names
-
-
-def timed_hand(
-    path: Path,
-    positions: Float[Array, "t 21 3"],
-    clock: Clock,
-    side: str,
-    layout: str,
-    source: str,
-    warnings: tuple[str, ...] = (),
-) -> KeypointRecording:
-    """The recording of keypoints (m; NaN where missing) in frames at these times.
-
-    Raises:
-        InputError: the times are not sound, or nothing was seen.
-    """
-    fps = clock.rate
-    if fps is None and clock.times is not None:
-        fps, positions = evenly(path, clock.times, positions)
-    return check_keypoints(
-        KeypointRecording(fps=fps, positions=positions, side=side, layout=layout, source=source, warnings=warnings)
-    )

@@ -3,25 +3,21 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
-from mjx_hand.capture.keypoint_frames.assemble import Clock
 from mjx_hand.capture.keypoint_frames.frame_hand import FrameHand
 from mjx_hand.capture.keypoints.recording import SIDES
-from mjx_hand.capture.keypoints.times import stated_rate
-from mjx_hand.errors import InputError
+from mjx_hand.capture.timeline.clock_names import names_numbers, names_time
+from mjx_hand.capture.timeline.compare_clocks import stated_rate, timeline_of
+from mjx_hand.capture.timeline.timeline import Timeline
 from mjx_hand.files.delimited import Table
 
-_TIMES = ("time", "t", "timestamp", "time_s", "time_ms", "timestamp_ms")
-_NUMBERS = ("frame", "frame_number", "frame_id", "frame_index", "frame_idx")
+_CLOCKS = (names_time, names_numbers)
 _MIRRORED = ("handedness", "label")
 _HANDS = ("hand", "side", *_MIRRORED, "hand_side", "hand_id", "hand_index")
-_MOST_GAPS = 100  # frame numbers may leave out so many times what they name
 
 
 def is_clock(column: str) -> bool:
     """Whether a column says which frame a line is of."""
-    return column.lower() in (*_TIMES, *_NUMBERS)
+    return any(named(column) for named in _CLOCKS)
 
 
 def hand_column(columns: Sequence[str]) -> int | None:
@@ -39,7 +35,7 @@ def hand_in(column: str, cell: str) -> tuple[str, str]:
 
 def frames_of_rows(
     path: Path, table: Table, rows: Sequence[Sequence[str]], hands: Sequence[Sequence[FrameHand]]
-) -> tuple[list[list[FrameHand]], Clock]:
+) -> tuple[list[list[FrameHand]], Timeline]:
     """The hands in each frame, and when the frames were taken.
 
     Lines of one time or frame number are one frame, where they are of different hands.
@@ -50,9 +46,7 @@ def frames_of_rows(
         rows: their cells.
         hands: in each of them.
     """
-    rate = stated_rate(path, "fps", table.said["fps"]) if "fps" in table.said else None
-    lower = [column.lower() for column in table.columns]
-    time, number = (next((lower.index(n) for n in names if n in lower), None) for names in (_TIMES, _NUMBERS))
+    time, number = (next((k for k, c in enumerate(table.columns) if named(c)), None) for named in _CLOCKS)
     if time is not None and rows and not _is_number(rows[0][time]):
         time = None  # a date, which says nothing here
     column = number if number is not None else time
@@ -66,12 +60,15 @@ def frames_of_rows(
     frames = [[hand for k in groups[cell] for hand in hands[k]] for cell in order]
     first = [groups[cell][0] for cell in order]
     kept = [rows[k] for k in first]
-    times = None if time is None else table.numbers(kept, [time])[:, 0]
-    if number is not None:
-        numbers = table.numbers(kept, [number])[:, 0]
-        if times is None and np.isfinite(numbers).all():
-            frames = _with_gaps(path, frames, numbers)
-    return frames, Clock(rate, times if rate is None else None, name="" if time is None else table.columns[time])
+    timeline = timeline_of(
+        path,
+        len(kept),
+        rate=stated_rate(path, "fps", table.said["fps"]) if "fps" in table.said else None,
+        times=None if time is None else table.stamps(kept, time),
+        name="" if time is None else table.columns[time],
+        numbers=None if number is None else table.stamps(kept, number),
+    )
+    return frames, timeline
 
 
 def _is_number(cell: str) -> bool:
@@ -80,17 +77,3 @@ def _is_number(cell: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _with_gaps(path: Path, frames: list[list[FrameHand]], numbers: np.ndarray) -> list[list[FrameHand]]:
-    """Frames at their numbers, with nothing in those that are left out."""
-    steps = np.diff(numbers)
-    if len(steps) and (steps == steps[0]).all() and steps[0] > 0:
-        return frames
-    rows = (numbers - numbers[0]).astype(int)
-    if (steps <= 0).any() or rows[-1] > _MOST_GAPS * len(rows):
-        raise InputError(f"{path}: frame numbers do not grow, or leave most of them out; sort the lines by frame")
-    made: list[list[FrameHand]] = [[] for _ in range(int(rows[-1]) + 1)]
-    for row, frame in zip(rows, frames, strict=True):
-        made[row] = frame
-    return made

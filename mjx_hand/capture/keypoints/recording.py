@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from mjx_hand.capture.keypoints.layouts import KEYPOINTS, NUM_KEYPOINTS
 from mjx_hand.errors import InputError
-from mjx_hand.files.checked_arrays import numbers, text
+from mjx_hand.files.checked_arrays import numbers, text, texts
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 from mjx_hand.pytree import pytree, static
 
@@ -71,7 +71,7 @@ def save_keypoints(recording: KeypointRecording, path: str | Path) -> None:
     check_keypoints(recording)
     if recording.fps is None:
         raise InputError(f"{recording.source or 'keypoints'}: the frame rate is not known; give fps, as in fps=30")
-    arrays = {
+    arrays: dict[str, np.ndarray | float | str] = {
         "fps": recording.fps,
         "positions": recording.positions,
         "names": np.array(KEYPOINTS),
@@ -79,6 +79,8 @@ def save_keypoints(recording: KeypointRecording, path: str | Path) -> None:
         "layout": recording.layout,
         "source": recording.source,
     }
+    if recording.warnings:
+        arrays["warnings"] = np.array(recording.warnings)
     save_arrays(path, SCHEMA, arrays)
 
 
@@ -99,5 +101,6 @@ def load_keypoint_file(path: str | Path) -> KeypointRecording:
             side=text(path, a, "side"),
             layout=text(path, a, "layout"),
             source=text(path, a, "source"),
+            warnings=texts(a, "warnings"),
         )
     )

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from mjx_hand.capture.keypoint_files.load_keypoints import load_keypoints
 from mjx_hand.capture.keypoints.layouts import LAYOUTS, KeypointLayout, from_keypoints
 from mjx_hand.capture.keypoints.recording import KeypointRecording, load_keypoint_file, save_keypoints
-from mjx_hand.capture.keypoints.times import evenly, in_seconds
 from mjx_hand.capture.load import load_motion
 from mjx_hand.errors import InputError
 from tests.capture.keypoints.grips import FPS, grip, keypoints_of
@@ -180,27 +179,6 @@ def test_any_layout_and_pose_comes_back_from_json(tmp_path, name, seed):
     frames = [named(LAYOUTS[name], p, str(rng.choice(["list", "xyz", "pose"]))) for p in points]
     found = load_keypoints(write_json(tmp_path / "hand.json", frames, fps=30))
     np.testing.assert_allclose(found.positions, points, atol=1e-9)
-
-
-@pytest.mark.parametrize("unit", [1.0, 1e3, 1e6, 1e9])
-@pytest.mark.parametrize("fps", [2.0, 30.0, 240.0])
-def test_times_in_any_unit_give_the_rate(unit, fps):
-    times = 5.0 * unit + np.arange(50) / fps * unit
-    assert np.diff(in_seconds(times)) == pytest.approx(1 / fps)
-    rate, kept = evenly("file", times, np.zeros((50, 3)))
-    assert rate == pytest.approx(fps)
-    assert len(kept) == 50
-
-
-def test_uneven_times_are_interpolated_and_dropped_frames_left_open():
-    times = np.array([0.0, 0.1, 0.2, 0.33, 0.4, 0.5, 0.9, 1.0])
-    rate, values = evenly("file", times, times[:, None])
-    assert rate == pytest.approx(10.0)
-    assert np.isnan(values[6:9]).all()
-    kept = np.delete(np.arange(11), [6, 7, 8])
-    np.testing.assert_allclose(values[kept, 0], kept / 10, atol=1e-9)
-    with pytest.raises(InputError, match="frame 2's time is not after"):
-        evenly("file", np.array([0.0, 1.0, 1.0]), np.zeros((3, 1)))
 
 
 def refused(path: Path, **said: object) -> str:
