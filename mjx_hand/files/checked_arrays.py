@@ -2,12 +2,16 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from mjx_hand.errors import InputError
 
 Dimension = int | str
+# Lines of text. Not tuple[str, ...]: type checkers at run time look at an item of it that they draw by chance, which
+# whoever builds random data from a seed (Hypothesis) must not have.
+Lines = tuple[Any, ...]
 
 
 def numbers(
@@ -51,7 +55,7 @@ def numbers(
     return found
 
 
-def texts(arrays: Mapping[str, np.ndarray], name: str) -> tuple[str, ...]:
+def texts(arrays: Mapping[str, np.ndarray], name: str) -> Lines:
     """The strings of that name; none where it is missing."""
     return tuple(str(each) for each in np.ravel(arrays[name])) if name in arrays else ()
 

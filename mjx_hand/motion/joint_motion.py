@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from mjx_hand.errors import InputError
-from mjx_hand.files.checked_arrays import numbers, text, texts
+from mjx_hand.files.checked_arrays import Lines, numbers, text, texts
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 from mjx_hand.hand.joints import HINGES, NUM_HINGES
 from mjx_hand.pytree import pytree, static
@@ -44,7 +44,7 @@ class JointMotion:
     valid: Bool[np.ndarray, "t"]
     side: str = static(default="right")
     source: str = static(default="")
-    warnings: tuple[str, ...] = static(default=())
+    warnings: Lines = static(default=())
 
     @property
     def num_frames(self) -> int:

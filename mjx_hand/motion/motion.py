@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from mjx_hand.errors import InputError
-from mjx_hand.files.checked_arrays import numbers, text, texts
+from mjx_hand.files.checked_arrays import Lines, numbers, text, texts
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 from mjx_hand.hand.joints import FINGERS, NUM_BALL_JOINTS, NUM_LINKS
 from mjx_hand.pytree import pytree, static
@@ -53,7 +53,7 @@ class Motion:
     tip_offset: Float[np.ndarray, "5 3"] | None = None
     side: str = static(default="right")
     source: str = static(default="")
-    warnings: tuple[str, ...] = static(default=())
+    warnings: Lines = static(default=())
 
     @property
     def num_frames(self) -> int:

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from mjx_hand.errors import InputError
-from mjx_hand.files.checked_arrays import numbers, text, texts
+from mjx_hand.files.checked_arrays import Lines, numbers, text, texts
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 from mjx_hand.motion.resample import quaternion_matrices
 from mjx_hand.pytree import pytree, static
@@ -43,7 +43,7 @@ class RobotMotion:
     joint_names: tuple[str, ...] = static()
     robot: str = static(default="")
     source: str = static(default="")
-    warnings: tuple[str, ...] = static(default=())
+    warnings: Lines = static(default=())
 
 
 def save_robot_motion(motion: RobotMotion, path: str | Path) -> None:

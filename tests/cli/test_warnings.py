@@ -27,7 +27,7 @@ def wavering(share: float) -> np.ndarray:
 
 def test_a_doubtful_recording_is_written_with_a_warning(tmp_path, capsys):
     out = tmp_path / "motion.npz"
-    assert main(["keypoints", str(written(tmp_path / "hand.json", wavering(0.3))), "--out", str(out)]) == 0
+    assert main(["keypoints", str(written(tmp_path / "hand.json", wavering(0.15))), "--out", str(out)]) == 0
     said = capsys.readouterr().out
     (warning,) = [w for w in load_motion_file(out).warnings if w.startswith("bone lengths")]
     assert f"warning: {warning}" in said
@@ -43,7 +43,7 @@ def test_a_good_recording_has_no_warning(tmp_path, capsys):
 
 
 def test_what_no_hand_does_is_refused_and_told_by_info(tmp_path, capsys):
-    path, out = written(tmp_path / "hand.json", wavering(1.5)), tmp_path / "motion.npz"
+    path, out = written(tmp_path / "hand.json", wavering(0.5)), tmp_path / "motion.npz"
     assert main(["keypoints", str(path), "--out", str(out)]) == 2
     said = capsys.readouterr().err
     assert "bone lengths: vary by" in said
@@ -67,7 +67,7 @@ def test_what_was_done_about_times_is_told(tmp_path, capsys):
 def test_retarget_passes_warnings_on(tmp_path, capsys):
     folder = tmp_path / "set"
     folder.mkdir()
-    main(["keypoints", str(written(tmp_path / "hand.json", wavering(0.3))), "--out", str(folder / "a.npz")])
+    main(["keypoints", str(written(tmp_path / "hand.json", wavering(0.15))), "--out", str(folder / "a.npz")])
     main(["keypoints", str(written(tmp_path / "good.json", POINTS)), "--out", str(folder / "b.npz")])
     capsys.readouterr()
     assert main(["retarget", str(folder), "--out", str(tmp_path / "out")]) == 0

@@ -27,7 +27,7 @@ PLAIN = RetargetOptions()
 
 def made(frames: int, seed: int) -> Motion:
     rng = np.random.default_rng(seed)
-    turn = np.cumsum(0.02 * rng.normal(size=(frames, 15, 3)), axis=0)
+    turn = np.array([0.0, 0.0, 0.3]) + 0.4 * np.sin(np.cumsum(0.05 * rng.normal(size=(frames, 15, 3)), axis=0))
     valid = rng.random(frames) > 0.1
     valid[0] = True
     rotations = Rotation.from_rotvec(turn.reshape(-1, 3)).as_matrix().reshape(frames, 15, 3, 3)

@@ -114,8 +114,18 @@ def fit_keypoints(
     fitted = posed_keypoints(rest, rotations, quaternion_matrices(motion.wrist_quaternion), motion.wrist_position)
     report = make_report(recording.positions, fitted, valid)
     size = float(np.linalg.norm(rest.keypoints[_MIDDLE_TIP]))
-    found = [*keypoint_findings(recording, hand), *residual_findings(float(np.nanmean(report.distance)), size)]
+    found = [
+        *keypoint_findings(recording, hand),
+        *residual_findings(_residual(recording.positions[valid], report.fitted[valid]), size),
+    ]
     return plausible_motion(check_motion(motion), *found, name=name), report
+
+
+def _residual(seen: Float[Array, "t 21 3"], fitted: Float[Array, "t 21 3"]) -> float:
+    """The mean distance (m) of the keypoints that are seen, in the middle of the frames."""
+    distance = np.linalg.norm(fitted - seen, axis=-1)
+    known = np.isfinite(distance)
+    return float(np.median(np.where(known, distance, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)))
 
 
 def _wrist(

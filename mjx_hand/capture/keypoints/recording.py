@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from mjx_hand.capture.keypoints.layouts import KEYPOINTS, NUM_KEYPOINTS
 from mjx_hand.errors import InputError
-from mjx_hand.files.checked_arrays import numbers, text, texts
+from mjx_hand.files.checked_arrays import Lines, numbers, text, texts
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 from mjx_hand.pytree import pytree, static
 
@@ -33,7 +33,7 @@ class KeypointRecording:
     side: str = static(default="")
     layout: str = static(default="mediapipe")
     source: str = static(default="")
-    warnings: tuple[str, ...] = static(default=())
+    warnings: Lines = static(default=())
 
     @property
     def num_frames(self) -> int:

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from mjx_hand.errors import InputError
-from mjx_hand.files.checked_arrays import texts
+from mjx_hand.files.checked_arrays import Lines, texts
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 from mjx_hand.pytree import pytree, replace, static
 
@@ -33,7 +33,7 @@ class MarkerRecording:
     visible: Bool[np.ndarray, "t m"]
     names: tuple[str, ...] = static()
     source: str = static(default="")
-    warnings: tuple[str, ...] = static(default=())
+    warnings: Lines = static(default=())
 
     @property
     def num_frames(self) -> int:

@@ -11,12 +11,13 @@ from jaxtyping import Float
 from mjx_hand.capture.timeline.clock_names import UNITS, unit_in
 from mjx_hand.capture.timeline.row_order import RowOrder, row_order
 from mjx_hand.capture.timeline.time_units import frame_step, near_equal, seconds_of
-from mjx_hand.capture.timeline.timeline import Timeline, interpolated, placed
+from mjx_hand.capture.timeline.timeline import Timeline, interpolated, placed, rounding
 from mjx_hand.errors import InputError
 
 Array = np.ndarray
 
-ROUNDED = 0.75  # frames by which a time may be off its frame because it is rounded
+STEADY = 0.45  # frames by which times may be off frames in a row; a frame left out makes half a frame
+ON_FRAMES = 0.05  # frames by which times are off their frames that are not rounded more coarsely than to frames
 ONE = 1.6  # frames: a longer step has a gap in it
 NOMINAL, SAME = 0.2, 0.02  # shares by which measured and stated rates may differ: a nominal rate, and the same one
 FEW = 0.1  # least share of steps of one frame, for the rate to be confirmed by them
@@ -136,10 +137,9 @@ def _by_rate(
     named = unit_in(name)
     units = [named] if named else list(UNITS)
     for unit in units:
-        ticks = (times - times[0]) * UNITS[unit] * rate
-        if np.abs(ticks - np.arange(len(ticks))).max() <= ROUNDED:
-            order = RowOrder(np.arange(len(ticks)), NO_TWINS, ())
-            _check_numbers(path, order, np.arange(len(ticks), dtype=float), numbers)
+        if _in_a_row(times * UNITS[unit], rate):
+            order = RowOrder(np.arange(len(times)), NO_TWINS, ())
+            _check_numbers(path, order, np.arange(len(times), dtype=float), numbers)
             return placed(path, order.kept, order.kept, rate, NO_TWINS)
     for unit in units:
         seconds = times * UNITS[unit]
@@ -166,6 +166,16 @@ def _by_rate(
     raise InputError(
         f"{path}: states {rate:g} frames per second, but its times are {told}; correct one of them, or leave one out"
     )
+
+
+def _in_a_row(seconds: Float[Array, "t"], rate: float) -> bool:
+    """Whether rows are frames one after the other at this rate, by their times, which may be rounded coarsely."""
+    ticks = (seconds - seconds[0]) * rate
+    off = np.ptp(ticks - np.arange(len(ticks))) / 2
+    if off <= STEADY:
+        return True
+    rounded = np.abs(ticks - np.rint(ticks)).max() > ON_FRAMES
+    return bool(rounded and off <= 1.05 * rounding(seconds) * rate)
 
 
 def _frames_of_numbers(

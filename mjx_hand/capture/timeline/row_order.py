@@ -46,8 +46,9 @@ def row_order(path: object, stamps: Float[Array, "t"], near: float, what: str) -
         rows = _longest_growing(stamps)
         astray = np.setdiff1d(np.arange(len(stamps)), rows)
         if len(astray) > max(1, ASTRAY * len(stamps)):
+            first = int(np.argmax(np.diff(stamps) < 0)) + 1
             raise InputError(
-                f"{path}: frame {astray[0]}'s {what} is not after the one before, nor are {len(astray) - 1} others'; "
+                f"{path}: frame {first}'s {what} is before the one before it, and {len(astray)} are out of order; "
                 f"sort the frames by {what}, and give one recording a file"
             )
         notes.append(f"{_frames(len(astray))} left out whose {what} is before an earlier one's, first {astray[0]}")

@@ -13,6 +13,7 @@ LONG, VERY_LONG = 4 * 3600.0, 48 * 3600.0  # s of one recording
 # Speeds (m/s) that a wrist is below in 19 of 20 frames: a hard throw reaches 10 for a tenth of a second (Fleisig et
 # al., Kinetics of baseball pitching, 1995). Noise of video at 30/s adds 0.5.
 SWIFT, IMPOSSIBLE = 10.0, 100.0
+ENOUGH = 30  # steps from frame to frame, for a speed to be beyond doubt: fewer may be examples, not a recording
 
 
 def span_findings(fps: float, frames: int) -> list[Finding]:
@@ -36,7 +37,7 @@ def travel_findings(positions: Float[Array, "t 3"], valid: Bool[Array, "t"], fps
         "wrist speed",
         speed,
         SWIFT,
-        IMPOSSIBLE,
+        IMPOSSIBLE if both.sum() >= ENOUGH else np.inf,
         f"{speed:.3g} m/s in a twentieth of the frames",
         f"below {SWIFT:g}",
         "check the unit of the positions, and the rate",

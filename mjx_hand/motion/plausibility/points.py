@@ -10,25 +10,31 @@ from mjx_hand.motion.plausibility.finding import Finding, graded
 
 Array = np.ndarray
 
-# How much bones' lengths vary over time (standard deviation over mean, the mean over the bones): recordings from video
-# have 0.05 to 0.10, image landmarks and joints of another order 0.1 to 0.4.
-WAVERING, NO_BONES = 0.2, 0.6
+# How much bones' lengths vary over time (`variation`): recordings from video
+# have 0.05 to 0.10, image landmarks and joints of another order 0.1 to 0.4, noise
+# alone 0.42.
+WAVERING, NO_BONES = 0.2, 0.35
 SAME_PLACE = 5e-4  # m; two joints are never that close
 SOMETIMES, MOSTLY = 0.02, 0.5  # shares of the frames in which points coincide
 # Factor by which a length differs from a mean hand's of the same size (root of the mean square of its logarithm):
 # recordings have 1.12 to 1.15, Leap's bones 1.29; tips for bases 1.38 to 1.54, MANO's order 1.84 to 2.08.
 UNLIKE, NO_HAND = 1.36, 1.75
-# Mean distance of points from the fitted hand, in hand lengths: 0.03 to 0.041, orders of fingers or joints 0.10 to 0.29.
+# Mean distance of points from the fitted hand, in hand lengths: 0.03 to 0.041, with another order 0.10 to 0.29.
 RESIDUAL, NO_FIT = 0.07, 0.2
 IN_PICTURE = 1e-3  # image landmarks' wrist has depth 0: the others' are counted from it
 FLAT_VARIES = 0.08  # how much bones vary, at least, where depth is a guess
 
 
 def variation(lengths: Float[Array, "t n"]) -> float:
-    """Standard deviation over mean of bone lengths (m; NaN where not seen) over time, the mean over the bones."""
+    """How much bone lengths (m; NaN where not seen) vary over time; single frames do not count.
+
+    Half of what two thirds of the frames are within, which is a normal distribution's standard deviation, over the
+    median; the mean over the bones.
+    """
     with warnings.catch_warnings(), np.errstate(invalid="ignore", divide="ignore"):
         warnings.simplefilter("ignore", RuntimeWarning)  # bones that are never seen are NaN
-        return float(np.nanmean(np.nanstd(lengths, axis=0) / np.nanmean(lengths, axis=0)))
+        low, middle, high = np.nanpercentile(lengths, (15.9, 50, 84.1), axis=0)
+        return float(np.nanmean((high - low) / 2 / middle))
 
 
 def constancy_findings(lengths: Float[Array, "t n"]) -> list[Finding]:

@@ -12,12 +12,12 @@ Array = np.ndarray
 # Standard deviations of people's hands in one direction of shape: one in 10^4 is beyond 4. Recordings have up to 2.3,
 # joints in another order than they are read 4 to 9.
 LARGE_SHAPE, NO_SHAPE = 5.0, 15.0
-# Degrees by which a finger joint's rotation is from the flat hand's. Flexed fully it is 105; joints read in MANO's order
-# for MediaPipe's give 170 in the middle of the frames, tips for bases 150.
+# Degrees by which a finger joint's rotation is from the flat hand's. Flexed fully it is 105; MANO's order read as
+# MediaPipe's gives 170 in the middle of the frames, tips for bases 150.
 FAR_TURN, NO_TURN = 130.0, 145.0
 FEW, MOST = 0.1, 0.5  # shares of the frames in which a thing is doubtful, and wrong
-# Mean bend (degrees) of the fingers' outer joints, backwards. The flattest recording has 3 forwards, mirrored ones 10 to
-# 44 backwards.
+# Mean bend (degrees) of the fingers' outer joints, backwards. The flattest recording has 3 forwards, mirrored ones
+# 10 to 44 backwards.
 BACK, BACKWARDS = 3.0, 15.0
 # Degrees beyond the range of motion (`rigid.limits`).
 BEYOND, FAR_BEYOND = 30.0, 60.0

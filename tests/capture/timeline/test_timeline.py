@@ -151,7 +151,7 @@ def test_a_nominal_rate_gives_way_to_the_times():
         ({"times": np.arange(90) / 30, "numbers": AHEAD}, "numbers and times contradict each other: at frame 30"),
         ({"times": np.array([0, 1, np.inf, 3]) / 30}, "frame 2's time is inf"),
         ({"times": np.array([0, 1, np.nan, 3]) / 30, "rate": 30.0}, "frame 2's time is nan"),
-        ({"times": np.r_[0:20, 0:20] / 30.0}, "frame 20's time is not after the one before, nor are 18 others"),
+        ({"times": np.r_[0:20, 0:20] / 30.0}, "frame 20's time is before the one before it"),
         ({"numbers": np.array([0.0, 1.5, 3])}, "frame 1's number is not a whole one"),
         ({"times": np.arange(9.0), "rate": -3.0}, "fps is -3.0, expected a positive number"),
         ({"times": np.r_[np.arange(6) / 30, 86400 + np.arange(6) / 30]}, "frame 6 is .* frames .8.64e.04 s. after"),
