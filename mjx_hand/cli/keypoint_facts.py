@@ -13,9 +13,8 @@ from mjx_hand.capture.keypoint_files.reader import KeypointReader
 from mjx_hand.capture.keypoint_fit.fit import fit_keypoints
 from mjx_hand.capture.keypoint_frames.one_hand import whole
 from mjx_hand.capture.keypoints.layouts import KEYPOINTS
-    findings = map(str, keypoint_findings(replace(found, fps=rate), load_hand()))
-    doubts = dict.fromkeys((*found.warnings, *picture_warning(found.positions), *findings))
-    warnings = tuple(("warning", doubt) for doubt in doubts)
+from mjx_hand.capture.keypoints.picture import picture_warning
+from mjx_hand.capture.keypoints.plausible import keypoint_findings
 from mjx_hand.capture.keypoints.recording import SIDES, KeypointRecording
 from mjx_hand.capture.keypoints.side import known_side
 from mjx_hand.cli.facts_of import Facts, frames, share_missing
