@@ -15,13 +15,14 @@ import jax
 import numpy as np
 from tensorboardX import SummaryWriter
 
+from envs.demonstrations.dataset import make_missing_sets
 from envs.evaluation.evaluate import evaluate
 from envs.evaluation.roll_out import make_roll_out
 from envs.parallel import ParallelEnv
 from envs.tracking import TrackingEnv
 from mjx_hand.files.npz_archive import replacing
 from mjx_hand.progress import counter
-from train.experiment.setup import load_env, make_sets
+from train.experiment.setup import load_env
 from train.learning.cadence import rollouts_per_demonstration, updates_between
 from train.learning.checkpoint import Checkpoint, save_checkpoint
 from train.learning.curve import Point
@@ -59,7 +60,7 @@ def train(config: Config, env: TrackingEnv | None = None, watch: Watch | None = 
 
 def _train(config: Config, env: TrackingEnv | None, folder: RunFolder, watch: Watch | None) -> list[Point]:
     if env is None:
-        make_sets(config)
+        make_missing_sets(config.data, config.demonstrations)
         env = load_env(config, "train")
     learner = Learner(ParallelEnv(env, guard=config.debug.nan_guard), config.ppo)
     state, points, seconds = _start(config, learner, folder)

@@ -12,6 +12,7 @@ import tyro
 from mjx_hand.capture.datasets.dataset_format import dataset_formats
 from mjx_hand.capture.load import load_motion
 from mjx_hand.cli.output import check_out, print_table, print_warnings, spread
+from mjx_hand.cli.wording import as_options
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import LINKS, ONE_DOF, TWO_DOF
 from mjx_hand.motion import Motion, save_joint_motion
@@ -174,7 +175,7 @@ def _folder(
     if len(doubtful) > _SHOWN:
         print(f"warnings on {len(doubtful) - _SHOWN} more recordings stand in {SUMMARY}")
     for outcome in failed[:_SHOWN]:
-        print(f"failed: {outcome.message}")
+        print(f"failed: {as_options(outcome.message)}")
     if failed:
         more = f", {len(failed) - _SHOWN} of them not shown here" if len(failed) > _SHOWN else ""
         print(f"{len(failed)} of {len(outcomes)} recordings could not be used{more}; exit status 1")

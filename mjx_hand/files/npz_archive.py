@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from mjx_hand.errors import InputError
+from mjx_hand.files.input_file import refuse_pointer
 
 
 @contextlib.contextmanager
@@ -64,6 +65,7 @@ def open_arrays(path: str | Path) -> dict[str, np.ndarray]:
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: no such file; give the path of an .npz file")
+    refuse_pointer(path)
     try:
         # The file is opened here: np.load leaves one open that it opened itself and then cannot read.
         with path.open("rb") as opened:

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from mjx_hand.errors import InputError
+from mjx_hand.files.input_file import refuse_pointer
 
 _MISSING = {"", "nan", "NaN", "NAN", "null", "NULL", "-", "-nan", "-nan(ind)"}
 
@@ -17,6 +18,7 @@ def read_lines(path: Path) -> list[str]:
     Raises:
         InputError: the file is binary, or cannot be read.
     """
+    refuse_pointer(path)
     try:
         content = path.read_bytes()
     except OSError as error:

@@ -13,6 +13,7 @@ from jaxtyping import Float, Int
 
 from mjx_hand.errors import InputError
 from mjx_hand.files import safe_pickle
+from mjx_hand.files.input_file import refuse_pointer
 from mjx_hand.files.npz_archive import open_arrays
 from mjx_hand.hand.joints import NUM_LINKS, PARENTS, TIP_LINKS
 from mjx_hand.hand.model import HandModel
@@ -91,6 +92,7 @@ def _values(path: Path) -> dict[str, Any]:
     if not path.is_file():
         what = "a folder" if path.is_dir() else "no such file"
         raise InputError(f"{path}: {what}; give a MANO .pkl or .npz, or leave it out to use the open hand")
+    refuse_pointer(path)
     if zipfile.is_zipfile(path):
         return dict(open_arrays(path))
     return safe_pickle.read(path.read_bytes(), str(path))

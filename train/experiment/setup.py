@@ -3,7 +3,6 @@
 import dataclasses
 from pathlib import Path
 
-from envs.demonstrations.dataset import make_missing_sets
 from envs.demonstrations.load_env import env_of_set
 from envs.demonstrations.load_set import is_divided
 from envs.evaluation.evaluate import Evaluation, evaluate
@@ -14,15 +13,6 @@ from mjx_hand.errors import InputError
 from train.learning.checkpoint import Checkpoint, load_checkpoint
 from train.learning.policy import deterministic_policy
 from train.settings.config import Config
-
-
-def make_sets(config: Config) -> None:
-    """Make those demonstration sets of the experiment that are missing, and say so; `load_env` reads them.
-
-    Raises:
-        InputError: as `envs.demonstrations.dataset.make_set`.
-    """
-    make_missing_sets(config.data, config.demonstrations)
 
 
 def load_env(config: Config, part: str) -> TrackingEnv:

@@ -1,7 +1,9 @@
-"""Keypoints as JSON: a list of frames, or an object with `frames` and, beside it, `fps`, `unit`, `side` and `layout`.
+"""Keypoints as JSON: a list of frames, an object with `frames` and, beside it, `fps`, `unit`, `side` and `layout`, or
+one frame alone.
 
-`json_hands` has the forms that a frame may have. A frame's `time`, `timestamp` or `t` (`timestamp_ms` says a unit) and
-its `frame` number are compared with the rate; a frame that is null or empty is a gap.
+`json_hands` has the forms that a frame may have, `frame_lists` where the frames stand. A frame's `time`, `timestamp` or
+`t` (`timestamp_ms` says a unit) and its `frame` number are compared with the rate; a frame that is null or empty is a
+gap.
 """
 
 from collections.abc import Callable
@@ -10,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from mjx_hand.capture.keypoint_files.json_hands import FrameHand, frame_hands
-from mjx_hand.capture.keypoint_files.reader import KeypointReader
-from mjx_hand.capture.keypoint_files.timed_hand import timed_hand
-from mjx_hand.capture.keypoints.names import counted_keypoints, named_keypoints
+from mjx_hand.capture.keypoint_files.reader import VALUE, KeypointReader
+from mjx_hand.capture.keypoint_frames.assemble import recordings
+from mjx_hand.capture.keypoint_frames.frame_lists import frames_in
+from mjx_hand.capture.keypoint_frames.json_hands import frame_hands, has_world_landmarks
+from mjx_hand.capture.keypoint_frames.leap_frames import is_leap_frame
 from mjx_hand.capture.keypoints.recording import KeypointRecording
-from mjx_hand.capture.keypoints.size import unit_factor
 from mjx_hand.capture.timeline.clock_names import names_numbers, names_time
 from mjx_hand.capture.timeline.compare_clocks import LATEST, stated_rate, timeline_of
 from mjx_hand.capture.timeline.timeline import Timeline
@@ -24,35 +26,15 @@ from mjx_hand.errors import InputError
 _RATES = ("fps", "frame_rate", "frameRate", "rate")
 
 
-def _frames(value: Any) -> list[Any]:
-    frames = value.get("frames") if isinstance(value, dict) else value
-    return frames if isinstance(frames, list) else []
-
-
 def _recognises(value: Any) -> bool:
-    return any(frame_hands(frame) for frame in _frames(value))
+    frames, _ = frames_in(value)
+    return any(is_leap_frame(frame) or has_world_landmarks(frame) or frame_hands(frame) for frame in frames)
 
 
 def _read(path: Path, value: Any, unit: str | None) -> dict[str, KeypointRecording]:
-    frames = _frames(value)
-    said = value if isinstance(value, dict) else {}
-    hands: dict[str, list[FrameHand | None]] = {}
-    for k, frame in enumerate(frames):
-        for hand in frame_hands(frame):
-            course = hands.setdefault(hand.label, [None] * len(frames))
-            if course[k] is not None:
-                raise InputError(f"{path}: frame {k} has two hands called {hand.label!r}; keep one, or name them apart")
-            course[k] = hand
+    frames, said = frames_in(value)
     rows, timeline = _timeline(path, said, frames)
-    found = {}
-    for label, course in hands.items():
-        positions, layout = _positions(path, course, said.get("layout"))
-        first = next(hand for hand in course if hand is not None)
-        positions = positions * unit_factor(str(path), unit or said.get("unit") or first.unit or "m")
-        side = first.side or (str(said.get("side", "")).lower() if len(hands) == 1 else "")
-        source = path.name if len(hands) == 1 else f"{path.name} {label}"
-        found[label or "hand"] = timed_hand(path, positions[rows], timeline, side=side, layout=layout, source=source)
-    return found
+    return recordings(path, [frame_hands(frames[k]) for k in rows], timeline, said, unit)
 
 
 def _timeline(path: Path, said: dict[str, Any], frames: list[Any]) -> tuple[np.ndarray, Timeline]:
@@ -60,6 +42,8 @@ def _timeline(path: Path, said: dict[str, Any], frames: list[Any]) -> tuple[np.n
     times, name = _stamps(path, frames, names_time, "time")
     numbers, _ = _stamps(path, frames, names_numbers, "number")
     rate = next((stated_rate(path, key, said[key]) for key in _RATES if said.get(key) is not None), None)
+    if any(isinstance(frame, dict) and "handyRevision" in frame for frame in frames):
+        times = None  # of separate postures, no motion
     stamps = times if times is not None else numbers
     rows = np.arange(len(frames))
     if stamps is not None:
@@ -94,24 +78,9 @@ def _alone(value: Any) -> bool:
     return value is not None and not isinstance(value, dict | list)
 
 
-def _positions(path: Path, course: list[FrameHand | None], layout: str | None) -> tuple[np.ndarray, str]:
-    """The 21 keypoints in each frame, NaN where the hand is not there, and the layout's name."""
-    seen = [(k, hand) for k, hand in enumerate(course) if hand is not None]
-    names = list(dict.fromkeys(name for _, hand in seen for name in hand.names))
-    width = len(names) or len(seen[0][1].points)
-    points = np.full((len(course), width, 3), np.nan)
-    for k, hand in seen:
-        rows = [names.index(name) for name in hand.names] if names else list(range(width))
-        if len(rows) != len(hand.points):
-            raise InputError(f"{path}: frame {k} has {len(hand.points)} points where the first has {width}")
-        points[k, rows] = hand.points
-    points[~np.isfinite(points)] = np.nan
-    return named_keypoints(path, names, points) if names else counted_keypoints(path, points, layout)
-
-
 READER = KeypointReader(
-    name="keypoint frames (MediaPipe, Leap, WebXR, OpenXR, ARKit, Quest)",
-    suffix=".json",
+    name="keypoint frames (MediaPipe, Leap, WebXR, OpenXR, ARKit, MRTK, Quest)",
+    container=VALUE,
     recognises=_recognises,
     read=_read,
 )

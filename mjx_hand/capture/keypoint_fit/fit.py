@@ -79,7 +79,7 @@ def fit_keypoints(
     check_keypoints(recording)
     name = recording.source or "keypoints"
     if recording.fps is None:
-        raise InputError(f"{name}: does not say its frame rate; give fps")
+        raise InputError(f"{name}: does not say its frame rate; give fps, as in fps=30")
     never = [KEYPOINTS[k] for k in np.flatnonzero(~np.isfinite(recording.positions).any(axis=(0, 2))) if k > 0]
     if never:
         raise InputError(f"{name}: {', '.join(never)} never seen; every finger joint and tip is needed")

@@ -70,7 +70,7 @@ def save_keypoints(recording: KeypointRecording, path: str | Path) -> None:
     """
     check_keypoints(recording)
     if recording.fps is None:
-        raise InputError(f"{recording.source or 'keypoints'}: the frame rate is not known; give fps")
+        raise InputError(f"{recording.source or 'keypoints'}: the frame rate is not known; give fps, as in fps=30")
     arrays: dict[str, np.ndarray | float | str] = {
         "fps": recording.fps,
         "positions": recording.positions,

@@ -5,6 +5,7 @@ from pathlib import Path
 from mjx_hand.capture.marker_files.marker_format import MarkerFormat, marker_formats
 from mjx_hand.capture.markers.marker_recording import MarkerRecording
 from mjx_hand.errors import InputError
+from mjx_hand.files.input_file import refuse_pointer
 
 
 def load_markers(path: str | Path, units: str | None = None, fps: float | None = None) -> MarkerRecording:
@@ -26,6 +27,7 @@ def load_markers(path: str | Path, units: str | None = None, fps: float | None =
         raise InputError(f"{path}: {found}; give the path of a marker recording")
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; export the recording again")
+    refuse_pointer(path)
     known = marker_format_of(path)
     if known is None:
         names = ", ".join(each.name for each in marker_formats())

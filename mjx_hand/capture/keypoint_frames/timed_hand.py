@@ -11,7 +11,14 @@ from mjx_hand.capture.timeline.timeline import Timeline
 
 
 def timed_hand(
-    path: Path, positions: Float[np.ndarray, "t 21 3"], timeline: Timeline, *, side: str, layout: str, source: str = ""
+    path: Path,
+    positions: Float[np.ndarray, "t 21 3"],
+    timeline: Timeline,
+    *,
+    side: str,
+    layout: str,
+    source: str = "",
+    warnings: tuple[str, ...] = (),
 ) -> KeypointRecording:
     """The recording of keypoints (m; NaN, or exactly 0, 0, 0, where missing) in rows at `timeline`'s times.
 
@@ -25,6 +32,6 @@ def timed_hand(
             side=side,
             layout=layout,
             source=source or path.name,
-            warnings=timeline.notes,
+            warnings=(*warnings, *timeline.notes),
         )
     )

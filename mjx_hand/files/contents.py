@@ -14,6 +14,7 @@ import numpy as np
 
 from mjx_hand.errors import InputError
 from mjx_hand.files import safe_pickle
+from mjx_hand.files.input_file import refuse_pointer
 from mjx_hand.files.safe_tensor import is_tensor, tensor
 
 PICKLES = (".pkl", ".pickle", ".p")
@@ -30,6 +31,7 @@ def read_contents(path: Path) -> dict[str, Any]:
     """
     if not path.is_file():
         return {}
+    refuse_pointer(path)
     if path.suffix == ".npz" or (path.suffix not in (*PICKLES, ".npy") and zipfile.is_zipfile(path)):
         return _archive(path)
     if path.suffix == ".npy":
