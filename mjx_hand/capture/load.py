@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-from mjx_hand.capture.datasets.contents import WHOLE, read_contents
 from mjx_hand.capture.datasets.dataset_format import DatasetFormat, Request, dataset_formats
 from mjx_hand.capture.marker_files.load_markers import load_markers
 from mjx_hand.capture.marker_fit.fit import fit_markers
@@ -10,6 +9,7 @@ from mjx_hand.capture.markers.gap_filling import FILL, fill_short_gaps
 from mjx_hand.capture.markers.labels import match_labels
 from mjx_hand.capture.markers.marker_set import load_marker_set
 from mjx_hand.errors import InputError
+from mjx_hand.files.contents import WHOLE, read_contents
 from mjx_hand.hand.load import load_hand
 from mjx_hand.hand.model import HandModel
 from mjx_hand.motion import Motion

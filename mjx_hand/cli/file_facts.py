@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from mjx_hand.capture.datasets.contents import read_contents
 from mjx_hand.capture.datasets.dataset_format import dataset_formats
 from mjx_hand.capture.datasets.keypoints import FORMAT as KEYPOINTS
 from mjx_hand.capture.keypoint_files.load_keypoints import is_keypoint_file
@@ -12,6 +11,7 @@ from mjx_hand.capture.marker_files.marker_format import marker_formats
 from mjx_hand.capture.markers.marker_recording import SCHEMA as MARKERS
 from mjx_hand.cli import facts_of
 from mjx_hand.errors import InputError
+from mjx_hand.files.contents import read_contents
 from mjx_hand.files.npz_archive import schema_of
 from mjx_hand.motion import load_demonstration, load_joint_motion
 from mjx_hand.motion.demonstration import SCHEMA as DEMONSTRATION

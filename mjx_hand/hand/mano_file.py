@@ -13,7 +13,7 @@ from jaxtyping import Float, Int
 
 from mjx_hand.errors import InputError
 from mjx_hand.files import safe_pickle
-from mjx_hand.files.npz_archive import open_arrays
+from mjx_hand.files.contents import read_archive
 from mjx_hand.hand.joints import NUM_LINKS, PARENTS, TIP_LINKS
 from mjx_hand.hand.model import HandModel
 
@@ -92,7 +92,7 @@ def _values(path: Path) -> dict[str, Any]:
         what = "a folder" if path.is_dir() else "no such file"
         raise InputError(f"{path}: {what}; give a MANO .pkl or .npz, or leave it out to use the open hand")
     if zipfile.is_zipfile(path):
-        return dict(open_arrays(path))
+        return read_archive(path)
     return safe_pickle.read(path.read_bytes(), str(path))
 
 
