@@ -11,8 +11,8 @@ import pickle
 import re
 import struct
 import sys
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Callable, Iterable
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -81,44 +81,37 @@ def _check_keys(keys: Iterable[Any]) -> None:
                 raise pickle.UnpicklingError("a key or an entry of a set that is no name and no number")
 
 
+def _with_keys_checked(opcode: bytes, keys: slice) -> Callable[[Any], None]:
+    """What an opcode does, once `_check_keys` has seen that part of the stack."""
+    load = pickle._Unpickler.dispatch[opcode[0]]
+
+    def checked(reader: Any) -> None:
+        _check_keys(reader.stack[keys])
+        load(reader)
+
+    return checked
+
+
+def _load_bytearray(reader: Any) -> None:
+    """BYTEARRAY8 without room for more bytes than there are."""
+    (length,) = struct.unpack("<Q", reader.read(8))
+    data = reader.read(min(length, sys.maxsize))
+    if len(data) < length:
+        raise pickle.UnpicklingError("truncated")
+    reader.append(bytearray(data))
+
+
 # The pure-Python unpickler: the C one reserves memory for whatever memo index a damaged file names.
 class Reader(pickle._Unpickler):
     """An unpickler whose names are records."""
 
-    def load_bytearray8(self) -> None:
-        (length,) = struct.unpack("<Q", self.read(8))
-        data = self.read(min(length, sys.maxsize))
-        if len(data) < length:
-            raise pickle.UnpicklingError("truncated")
-        self.append(bytearray(data))
-
-    def load_setitem(self) -> None:
-        _check_keys(self.stack[-2:-1])
-        super().load_setitem()
-
-    def load_setitems(self) -> None:
-        _check_keys(self.stack[::2])
-        super().load_setitems()
-
-    def load_dict(self) -> None:
-        _check_keys(self.stack[::2])
-        super().load_dict()
-
-    def load_additems(self) -> None:
-        _check_keys(self.stack)
-        super().load_additems()
-
-    def load_frozenset(self) -> None:
-        _check_keys(self.stack)
-        super().load_frozenset()
-
-    dispatch = pickle._Unpickler.dispatch | {
-        pickle.BYTEARRAY8[0]: load_bytearray8,
-        pickle.SETITEM[0]: load_setitem,
-        pickle.SETITEMS[0]: load_setitems,
-        pickle.DICT[0]: load_dict,
-        pickle.ADDITEMS[0]: load_additems,
-        pickle.FROZENSET[0]: load_frozenset,
+    dispatch: ClassVar[dict[int, Callable[[Any], None]]] = pickle._Unpickler.dispatch | {
+        pickle.BYTEARRAY8[0]: _load_bytearray,
+        pickle.SETITEM[0]: _with_keys_checked(pickle.SETITEM, slice(-2, -1)),
+        pickle.SETITEMS[0]: _with_keys_checked(pickle.SETITEMS, slice(None, None, 2)),
+        pickle.DICT[0]: _with_keys_checked(pickle.DICT, slice(None, None, 2)),
+        pickle.ADDITEMS[0]: _with_keys_checked(pickle.ADDITEMS, slice(None)),
+        pickle.FROZENSET[0]: _with_keys_checked(pickle.FROZENSET, slice(None)),
     }
 
     def find_class(self, module: str, name: str) -> type[Record]:

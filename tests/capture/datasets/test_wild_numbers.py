@@ -38,7 +38,8 @@ def test_in_folders(tmp_path):
 @pytest.mark.parametrize("name", ["transl", "global_orient", "fullpose"])
 def test_in_grab(tmp_path, name):
     shape = {"transl": (6, 3), "global_orient": (6, 3), "fullpose": (6, 45)}[name]
-    refused(test_grab.write(tmp_path, **{name: with_wild(np.zeros(shape))}))
+    params: dict = {name: with_wild(np.zeros(shape))}
+    refused(test_grab.write(tmp_path, **params))
 
 
 @pytest.mark.parametrize("name", ["mano_global_pos", "mano_global_rot_aa", "mano_hand_pose", "mano_joint_pos"])
