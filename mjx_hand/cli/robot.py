@@ -15,6 +15,7 @@ from mjx_hand.cli.output import check_out, print_table, print_warnings, spread
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
 from mjx_hand.retarget.sequence import rigid_hand_of
+from mjx_hand.robots.hand_axes import check_goes_with
 from mjx_hand.robots.motion_keypoints import motion_keypoints
 from mjx_hand.robots.palm_frame import in_palm
 from mjx_hand.robots.robot_hand import load_robot, robot_objective
@@ -54,10 +55,14 @@ def robot(
     found = plausible_keypoints(found, load_hand(side=which))
     if found.fps is None:
         raise InputError(f"{recording}: does not say its frame rate; give --fps")
+    check_goes_with(description, urdf, which)
     keypoints = found.positions
     if not wanted.free_base:
         keypoints = in_palm(keypoints, which, description.fingers, description.palmar)
-    followed = retarget_keypoints(keypoints, tree, wanted)
+    followed = retarget_keypoints(keypoints, tree, wanted, fps=float(found.fps))
+    if tree.overruled:
+        names = ", ".join(name[:40] for name in tree.overruled)
+        print(f"warning: {urdf}: the limits of {names} leave the joint that it mimics one position; they do not count")
     motion = RobotMotion(
         fps=float(found.fps),
         values=joint_values(followed.dofs, tree),

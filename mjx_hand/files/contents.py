@@ -32,11 +32,12 @@ def read_contents(path: Path) -> dict[str, Any]:
     if not path.is_file():
         return {}
     refuse_pointer(path)
-    if path.suffix == ".npz" or (path.suffix not in (*PICKLES, ".npy") and zipfile.is_zipfile(path)):
-        return _archive(path)
-    if path.suffix == ".npy":
+    suffix = path.suffix.lower()
+    if suffix == ".npz" or (suffix not in (*PICKLES, ".npy") and zipfile.is_zipfile(path)):
+        return read_archive(path)
+    if suffix == ".npy":
         value = _array(path.read_bytes(), str(path))
-    elif path.suffix in PICKLES:
+    elif suffix in PICKLES:
         value = _unpickled(path.read_bytes(), str(path))
     else:
         return {}
@@ -48,10 +49,11 @@ def unwrapped(value: Any) -> Any:
     """What NumPy wrapped as an array of objects: the object of a lone one, else the list of them."""
     if not isinstance(value, safe_pickle.Record) or not value.name.endswith("._reconstruct"):
         return value
-    _, shape, dtype, _, data = value.state
-    if not dtype.args[0].startswith("O") or not isinstance(data, list):
-        return value
-    return data[0] if shape == () else data
+    match value.state:
+        case (_, tuple() as shape, safe_pickle.Record(args=(str() as code, *_)), _, list() as data):
+            if code.startswith("O"):
+                return data[0] if shape == () and len(data) == 1 else data
+    return value
 
 
 def plain(path: str | Path, name: str, value: Any) -> np.ndarray:
@@ -83,7 +85,12 @@ def _unpickled(data: bytes, where: str) -> Any:
     return safe_pickle.unpickle(data, where, "recording", "its publisher")
 
 
-def _archive(path: Path) -> dict[str, Any]:
+def read_archive(path: Path) -> dict[str, Any]:
+    """The named values in an `.npz`, whatever it is called; its objects, if it has any, as records.
+
+    Raises:
+        InputError: it is damaged, or names what no recording needs.
+    """
     try:
         with zipfile.ZipFile(path) as archive:
             members = [name for name in archive.namelist() if name.endswith(".npy")]

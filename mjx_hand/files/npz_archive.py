@@ -25,7 +25,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
     Raises:
         InputError: the file cannot be written there.
     """
-    path = Path(path)
+    path = followed(Path(path))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
@@ -43,6 +43,14 @@ def replacing(path: str | Path) -> Iterator[Path]:
         raise _cannot_write(path, error) from None
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def followed(path: Path) -> Path:
+    """What a symbolic link leads to, so that the link stays; `path` itself if it is none."""
+    target = Path(os.path.realpath(path)) if path.is_symlink() else path
+    if target.is_symlink():
+        raise InputError(f"cannot write {path}: its symbolic links lead round in a circle; choose another place")
+    return target
 
 
 def _cannot_write(path: Path, error: OSError) -> InputError:

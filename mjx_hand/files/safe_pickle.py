@@ -9,7 +9,10 @@ their bytes.
 import io
 import pickle
 import re
-from typing import Any
+import struct
+import sys
+from collections.abc import Callable, Iterable
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -22,7 +25,7 @@ _MOVED = {
     "numpy.core.multiarray": "numpy._core.multiarray",
     "numpy.core.numeric": "numpy._core.numeric",
     "numpy.matrixlib.defmatrix": "numpy",
-    **{f"scipy.sparse.{kind}": f"scipy.sparse._{kind}" for kind in ("csc", "csr")},
+    **{f"scipy.sparse.{kind}": f"scipy.sparse._{kind}" for kind in ("csc", "csr", "coo")},
 }
 _KNOWN = {
     "_codecs.encode",  # how Python 3 writes bytes in protocols 0 to 2
@@ -37,14 +40,14 @@ _KNOWN = {
     "numpy.dtype",
     "numpy.matrix",
     "numpy.ndarray",
-    *(f"scipy.sparse._{kind}.{kind}_{form}" for kind in ("csc", "csr") for form in ("matrix", "array")),
+    *(f"scipy.sparse._{kind}.{kind}_{form}" for kind in ("csc", "csr", "coo") for form in ("matrix", "array")),
     # PyTorch's tensors, which `safe_tensor` reads
     "collections.OrderedDict",
     "torch._utils._rebuild_tensor_v2",
     "torch.storage._load_from_bytes",
     *(f"torch.{kind}Storage" for kind in ("Half", "Float", "Double", "Int", "Long", "Short", "Char", "Byte", "Bool")),
 }
-_LARGEST = 10**8  # entries; no array of a hand comes near
+_LARGEST = 10**7  # entries of a sparse matrix made dense; MANO's have 12,448
 
 
 class Record:
@@ -70,9 +73,46 @@ class _Forbidden(Exception):
     """A name outside the list."""
 
 
+def _check_keys(keys: Iterable[Any]) -> None:
+    """Nothing, if keys are what data have for keys: Python would follow deeper ones to the end of its stack."""
+    for key in keys:
+        for part in key if isinstance(key, tuple) else (key,):
+            if not isinstance(part, str | bytes | int | float | complex | Record | None):
+                raise pickle.UnpicklingError("a key or an entry of a set that is no name and no number")
+
+
+def _with_keys_checked(opcode: bytes, keys: slice) -> Callable[[Any], None]:
+    """What an opcode does, once `_check_keys` has seen that part of the stack."""
+    load = pickle._Unpickler.dispatch[opcode[0]]
+
+    def checked(reader: Any) -> None:
+        _check_keys(reader.stack[keys])
+        load(reader)
+
+    return checked
+
+
+def _load_bytearray(reader: Any) -> None:
+    """BYTEARRAY8 without room for more bytes than there are."""
+    (length,) = struct.unpack("<Q", reader.read(8))
+    data = reader.read(min(length, sys.maxsize))
+    if len(data) < length:
+        raise pickle.UnpicklingError("truncated")
+    reader.append(bytearray(data))
+
+
 # The pure-Python unpickler: the C one reserves memory for whatever memo index a damaged file names.
 class Reader(pickle._Unpickler):
     """An unpickler whose names are records."""
+
+    dispatch: ClassVar[dict[int, Callable[[Any], None]]] = pickle._Unpickler.dispatch | {
+        pickle.BYTEARRAY8[0]: _load_bytearray,
+        pickle.SETITEM[0]: _with_keys_checked(pickle.SETITEM, slice(-2, -1)),
+        pickle.SETITEMS[0]: _with_keys_checked(pickle.SETITEMS, slice(None, None, 2)),
+        pickle.DICT[0]: _with_keys_checked(pickle.DICT, slice(None, None, 2)),
+        pickle.ADDITEMS[0]: _with_keys_checked(pickle.ADDITEMS, slice(None)),
+        pickle.FROZENSET[0]: _with_keys_checked(pickle.FROZENSET, slice(None)),
+    }
 
     def find_class(self, module: str, name: str) -> type[Record]:
         full = f"{_MOVED.get(module, module)}.{name}"
@@ -127,8 +167,8 @@ def read(data: bytes, where: str) -> dict[str, Any]:
 def array(value: Any) -> np.ndarray:
     """The NumPy array that a value of `read`'s dictionary stands for.
 
-    Understands NumPy arrays, matrices and scalars of plain numbers, SciPy's csc and csr matrices (made dense), and
-    chumpy's `Ch` and `Select`.
+    Understands NumPy arrays, matrices and scalars of plain numbers, SciPy's csc, csr and coo matrices (made dense),
+    and chumpy's `Ch` and `Select`.
 
     Raises:
         ValueError: it stands for none of these, or contradicts itself.
@@ -156,6 +196,8 @@ def array(value: Any) -> np.ndarray:
             return _dense(value.state, by_column=True)
         case "csr_matrix" | "csr_array":
             return _dense(value.state, by_column=False)
+        case "coo_matrix" | "coo_array":
+            return _dense_of_entries(value.state)
         case "_reconstructor":  # protocols 0 and 1: what is made is the first argument
             made = value.args[0]()
             made.state = value.state
@@ -201,10 +243,29 @@ def _dense(state: dict[str, Any], by_column: bool) -> np.ndarray:
     rows, columns = _shape(state.get("_shape", state.get("shape")))
     data, indices, starts = (array(state[key]).ravel() for key in ("data", "indices", "indptr"))
     outer, inner = (columns, rows) if by_column else (rows, columns)
-    if rows * columns > _LARGEST or len(starts) != outer + 1 or len(indices) != len(data):
+    counts = np.diff(starts.astype(np.int64))
+    fits = len(starts) == outer + 1 and starts[0] == 0 and starts[-1] == len(data)
+    if not fits or (counts < 0).any() or rows * columns > _LARGEST:
         raise ValueError(f"a sparse matrix of {rows} x {columns} whose parts do not fit together")
-    if indices.size and not 0 <= indices.min() <= indices.max() < inner:
-        raise ValueError(f"a sparse matrix of {rows} x {columns} with indices outside it")
-    dense = np.zeros((outer, inner), data.dtype)
-    np.add.at(dense, (np.repeat(np.arange(outer), np.diff(starts)), indices), data)
+    dense = _filled(outer, inner, np.repeat(np.arange(outer), counts), indices, data)
     return dense.T if by_column else dense
+
+
+def _dense_of_entries(state: dict[str, Any]) -> np.ndarray:
+    """A sparse matrix that lists its entries' places, dense."""
+    rows, columns = _shape(state.get("_shape", state.get("shape")))
+    at = state["coords"] if "coords" in state else (state["row"], state["col"])
+    first, second, data = (array(value).ravel() for value in (*at, state["data"]))
+    return _filled(rows, columns, first, second, data)
+
+
+def _filled(rows: int, columns: int, first: np.ndarray, second: np.ndarray, data: np.ndarray) -> np.ndarray:
+    """A matrix with these entries; those of one place add up."""
+    if min(rows, columns) < 0 or rows * columns > _LARGEST or not len(first) == len(second) == len(data):
+        raise ValueError(f"a sparse matrix of {rows} x {columns} whose parts do not fit together")
+    for index, end in ((first, rows), (second, columns)):
+        if index.size and (index.dtype.kind not in "iu" or not 0 <= index.min() <= index.max() < end):
+            raise ValueError(f"a sparse matrix of {rows} x {columns} with indices outside it")
+    dense = np.zeros((rows, columns), data.dtype)
+    np.add.at(dense, (first, second), data)
+    return dense

@@ -13,8 +13,8 @@ from jaxtyping import Float, Int
 
 from mjx_hand.errors import InputError
 from mjx_hand.files import safe_pickle
+from mjx_hand.files.contents import read_archive
 from mjx_hand.files.input_file import refuse_pointer
-from mjx_hand.files.npz_archive import open_arrays
 from mjx_hand.hand.joints import NUM_LINKS, PARENTS, TIP_LINKS
 from mjx_hand.hand.model import HandModel
 
@@ -94,7 +94,7 @@ def _values(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: {what}; give a MANO .pkl or .npz, or leave it out to use the open hand")
     refuse_pointer(path)
     if zipfile.is_zipfile(path):
-        return dict(open_arrays(path))
+        return read_archive(path)
     return safe_pickle.read(path.read_bytes(), str(path))
 
 

@@ -5,6 +5,7 @@ of the same compiled function over all devices. Files are read a little ahead, s
 """
 
 import dataclasses
+import os
 import re
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -136,7 +137,7 @@ def _items(folder: Path, out: Path, pattern: str, settings: dict) -> list[_Item]
     if out.resolve() == folder.resolve():
         raise InputError(f"{out}: recordings and outputs are in one folder; give another one for the outputs")
     try:
-        found = sorted(folder.rglob(pattern))
+        found = sorted({path for below in _folders(folder) for path in below.glob(_any_case(pattern))})
     except (ValueError, NotImplementedError) as error:
         raise InputError(f"pattern {pattern!r} is not one: {error}; give one such as '*.npz'") from None
     items: dict[Path, _Item] = {}
@@ -145,13 +146,37 @@ def _items(folder: Path, out: Path, pattern: str, settings: dict) -> list[_Item]
         hidden = any(part.startswith(".") for part in relative.parts)
         if hidden or source.resolve().is_relative_to(out.resolve()):
             continue
-        output = out / (relative if relative.suffix == ".npz" else relative.with_name(f"{relative.name}.npz"))
+        named = relative.suffix.lower() == ".npz"
+        output = out / (relative.with_suffix(".npz") if named else relative.with_name(f"{relative.name}.npz"))
         if output in items:
             raise InputError(f"{source} and {items[output].source} would have one output, {output}; rename one")
         items[output] = _Item(relative.as_posix(), source, output, key_of(source, settings), _size(source))
     if not items:
         raise InputError(f"{folder}: nothing in it matches {pattern!r}; give a pattern that fits the recordings' names")
     return list(items.values())
+
+
+def _folders(folder: Path) -> Iterator[Path]:
+    """`folder` and all below it, through symbolic links too, each once."""
+    known: set[str] = set()
+    for at, below, _ in os.walk(folder, followlinks=True):
+        real = os.path.realpath(at)
+        if real in known:
+            below.clear()
+            continue
+        known.add(real)
+        below[:] = sorted(name for name in below if not name.startswith("."))
+        yield Path(at)
+
+
+def _any_case(pattern: str) -> str:
+    """A pattern whose suffix may be in capitals: cameras and Windows write A.NPZ."""
+    stem, dot, ending = pattern.rpartition(".")
+    if not dot or not ending.isalnum():
+        return pattern
+    return (
+        stem + dot + "".join(f"[{letter.lower()}{letter.upper()}]" if letter.isalpha() else letter for letter in ending)
+    )
 
 
 def _size(source: Path) -> int:

@@ -18,7 +18,6 @@ from mjx_hand.robots.solver.objectives import Objective
 from mjx_hand.robots.solver.retarget_keypoints import check_keypoints, retarget_keypoints
 
 SMOOTHNESS = 1e-5  # of the human hand: enough to choose between equals, too little to be seen beside the keypoints
-COARSE, FINE = 30, 12  # iterations; the hand can reach its own keypoints, so that more steps pay
 SHORTEST, LONGEST = 3e-3, 0.3  # m; a bone beyond them is no bone of a hand
 SIZES = ("bones", "scale", "keep")
 
@@ -95,7 +94,7 @@ def human_motion(
     Raises:
         InputError: see `retarget_keypoints`.
     """
-    found = retarget_keypoints(keypoints, human_tree(rigid), human_objective(smoothness), coarse=COARSE, fine=FINE)
+    found = retarget_keypoints(keypoints, human_tree(rigid), human_objective(smoothness), fps=fps)
     return JointMotion(
         fps=fps,
         angles=found.dofs,

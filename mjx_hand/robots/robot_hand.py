@@ -9,15 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from mjx_hand.capture.keypoints.layouts import KEYPOINTS
 from mjx_hand.errors import InputError
+from mjx_hand.files.safe_yaml import read_yaml, shown
 from mjx_hand.robots.robot_urdf import robot_tree
 from mjx_hand.robots.solver.kinematic_tree import BASE, KinematicTree
 from mjx_hand.robots.solver.objectives import KINDS, Objective, dexpilot_pairs
 
 ROBOTS = Path(__file__).parent / "descriptions"
+SMALLEST, LARGEST = 0.05, 20.0  # of a robot over a person: from a toy to an excavator
 _NEEDED = ("palm", "tips", "scaling", "fingers", "palmar")
 _KNOWN = (*_NEEDED, "joints", "vectors")
 
@@ -61,11 +62,7 @@ def load_robot(robot: str | Path) -> RobotHand:
     path = ROBOTS / f"{robot}.yaml" if str(robot) in known_robots() else Path(robot)
     if not path.is_file():
         raise InputError(f"robot is {str(robot)!r}; valid: {', '.join(known_robots())}, or the path of a description")
-    try:
-        content = yaml.safe_load(path.read_text())
-    except (yaml.YAMLError, UnicodeDecodeError, OSError) as error:
-        raise InputError(f"{path}: not YAML that can be read ({str(error).splitlines()[0]})") from None
-    return _checked(path, content)
+    return _checked(path, read_yaml(path))
 
 
 def _checked(path: Path, content: Any) -> RobotHand:
@@ -73,8 +70,8 @@ def _checked(path: Path, content: Any) -> RobotHand:
         raise InputError(f"{path}: not a description; it needs {', '.join(_NEEDED)}")
     if missing := [name for name in _NEEDED if name not in content]:
         raise InputError(f"{path}: has no {missing[0]!r}; it needs {', '.join(_NEEDED)}")
-    if unknown := [str(name) for name in content if name not in _KNOWN]:
-        raise InputError(f"{path}: {unknown[0]!r} is not known; valid: {', '.join(_KNOWN)}")
+    if unknown := [name for name in content if name not in _KNOWN]:
+        raise InputError(f"{path}: {shown(unknown[0])} is not known; valid: {', '.join(_KNOWN)}")
     follows = {}
     for name in ("tips", "joints"):
         links = content.get(name, {})
@@ -84,13 +81,13 @@ def _checked(path: Path, content: Any) -> RobotHand:
     if len(follows["tips"]) < 2 or not next(iter(follows["tips"].values())).startswith("thumb"):
         raise InputError(f"{path}: tips must name two links or more, the thumb's first")
     if not isinstance(content["palm"], str):
-        raise InputError(f"{path}: palm is {content['palm']!r}; give a link's name")
+        raise InputError(f"{path}: palm is {shown(content['palm'])}; give a link's name")
     vectors = content.get("vectors", "tips")
     if vectors not in ("tips", "all"):
-        raise InputError(f"{path}: vectors is {vectors!r}; valid: tips, all")
+        raise InputError(f"{path}: vectors is {shown(vectors)}; valid: tips, all")
     scaling = content["scaling"]
-    if not isinstance(scaling, int | float) or not 0 < scaling < np.inf:
-        raise InputError(f"{path}: scaling is {scaling!r}; give a positive number")
+    if isinstance(scaling, bool) or not isinstance(scaling, int | float) or not SMALLEST <= scaling <= LARGEST:
+        raise InputError(f"{path}: scaling is {shown(scaling)}; give a number from {SMALLEST:g} to {LARGEST:g}")
     fingers, palmar = (_direction(path, name, content[name]) for name in ("fingers", "palmar"))
     if abs(fingers @ palmar) > 1e-3:
         raise InputError(f"{path}: fingers and palmar must be at right angles; their cosine is {fingers @ palmar:.3f}")
@@ -111,8 +108,9 @@ def _direction(path: Path, name: str, value: Any) -> np.ndarray:
         vector = np.array(value, dtype=float)
     except (TypeError, ValueError):
         vector = np.zeros(0)
-    if vector.shape != (3,) or not np.isfinite(vector).all() or np.linalg.norm(vector) < 1e-6:
-        raise InputError(f"{path}: {name} is {value!r}; give a direction of three numbers")
+    if vector.shape != (3,) or not np.isfinite(vector).all() or not np.abs(vector).max() > 1e-6:
+        raise InputError(f"{path}: {name} is {shown(value)}; give a direction of three numbers")
+    vector = vector / np.abs(vector).max()
     return vector / np.linalg.norm(vector)
 
 
@@ -134,8 +132,8 @@ def robot_objective(robot: RobotHand, urdf: str | Path, kind: str = "vector") ->
     if kind == "position":
         count = len(follows)
         pairs = ((BASE,) * count, tuple(range(count)), (BASE,) * count, numbers)
-        return robot_tree(urdf, list(follows)), _objective(kind, 1.0, pairs)
-    tree = robot_tree(urdf, [robot.palm, *follows])
+        return robot_tree(urdf, list(follows), robot.palm), _objective(kind, 1.0, pairs)
+    tree = robot_tree(urdf, [robot.palm, *follows], robot.palm)
     if kind == "vector":
         count = len(follows)
         pairs = ((0,) * count, tuple(range(1, count + 1)), (KEYPOINTS.index("wrist"),) * count, numbers)

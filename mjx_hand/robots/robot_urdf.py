@@ -1,12 +1,9 @@
-"""A robot hand's `KinematicTree` from its URDF (https://wiki.ros.org/urdf/XML), read with yourdfpy.
+"""A robot hand's `KinematicTree` from its URDF.
 
 Only joints between the root and the links asked for are kept: the others cannot move them.
 """
 
-import contextlib
-import logging
-import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,66 +12,50 @@ import yourdfpy
 from yourdfpy.urdf import Joint
 
 from mjx_hand.errors import InputError
-from mjx_hand.files.input_file import refuse_pointer
-from mjx_hand.robots.solver.kinematic_tree import BASE, KinematicTree, z_frame
+from mjx_hand.files.safe_yaml import shown
+from mjx_hand.robots.solver.kinematic_tree import BASE, HELD, KinematicTree, z_frame
+from mjx_hand.robots.urdf_file import check_joint, limits_of, read_urdf
 
-_MOVABLE = ("revolute", "continuous", "prismatic")
+_POINT = 1e-3  # rad or m; a range below it is a single position
+_SHOWN = 12  # how many of a robot's links a message names
 
 
-def robot_tree(path: str | Path, links: Sequence[str]) -> KinematicTree:
+def robot_tree(path: str | Path, links: Sequence[str], palm: str | None = None) -> KinematicTree:
     """The joints that move `links`, and the links' origins as points, in the frame of the URDF's root link.
 
     A mimic joint follows the joint that it names, through others if need be. A degree of freedom's limits are those of
-    all joints that it drives.
+    all joints that it drives, but for those in the tree's `overruled`.
+
+    Args:
+        path: of the URDF.
+        links: those asked for.
+        palm: a link that the root carries, on an arm or wrist perhaps: joints that would move it stand still, at zero
+            or as near as their limits allow.
 
     Raises:
         InputError: no such file, not a URDF, a link that it does not have, links that nothing moves, a joint of an
             unknown type or without limits, mimic joints that follow each other or none, limits that exclude each other.
     """
     path = Path(path)
-    robot = _read(path)
+    robot = read_urdf(path)
     names = [link.name for link in robot.links]
-    if missing := [link for link in links if link not in names]:
-        raise InputError(f"{path}: has no link {missing[0]!r}; its links: {', '.join(names)}")
+    if missing := [link for link in (*links, palm) if link is not None and link not in names]:
+        listed = ", ".join(str(name)[:40] for name in names[:_SHOWN]) + (", …" if len(names) > _SHOWN else "")
+        raise InputError(f"{path}: has no link {shown(missing[0])}; its links: {listed}")
     above = {joint.child: joint for joint in robot.joints}
     order: list[Joint] = []
     for link in links:
         known = {joint.name for joint in order}
         order += [joint for joint in _chain(path, link, above) if joint.name not in known]
-    for joint in order:
-        _check_joint(path, joint)
+    carrying = [] if palm is None else _chain(path, palm, above)
+    for joint in (*order, *carrying):
+        check_joint(path, joint)
     movable = [joint for joint in order if joint.type != "fixed"]
-    if not movable:
-        raise InputError(f"{path}: no movable joint moves {', '.join(links)}; name the links of fingers that move")
-    return _tree(path, robot, movable, above, links)
-
-
-def _read(path: Path) -> yourdfpy.Robot:
-    if not path.is_file():
-        raise InputError(f"{path}: {'a folder' if path.is_dir() else 'no such file'}; give the path of a URDF")
-    refuse_pointer(path)
-    try:
-        ElementTree.parse(path)  # yourdfpy takes what it can of a file that is cut short
-        with _quiet("yourdfpy.urdf"):
-            model = yourdfpy.URDF.load(str(path), build_scene_graph=False, load_meshes=False)
-    except Exception as error:  # yourdfpy passes on whatever XML and number parsing raise
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError(f"{path}: not a URDF that can be read ({reason})") from None
-    if not model.robot.links:
-        raise InputError(f"{path}: not a URDF: it has no links")
-    return model.robot
-
-
-@contextlib.contextmanager
-def _quiet(logger: str) -> Iterator[None]:
-    # yourdfpy logs an error for every mesh that is not beside the file; kinematics need none.
-    log = logging.getLogger(logger)
-    before = log.disabled
-    log.disabled = True
-    try:
-        yield
-    finally:
-        log.disabled = before
+    tree = _tree(path, robot, movable, above, links, [joint for joint in carrying if joint.type != "fixed"])
+    if not tree.dof_names:
+        named = ", ".join(str(link)[:40] for link in links)
+        raise InputError(f"{path}: no movable joint moves {named}; name the links of fingers that move")
+    return tree
 
 
 def _chain(path: Path, link: str, above: Mapping[str, Joint]) -> list[Joint]:
@@ -83,24 +64,10 @@ def _chain(path: Path, link: str, above: Mapping[str, Joint]) -> list[Joint]:
     while link in above:
         joint = above[link]
         if joint.name in {below.name for below in chain}:
-            raise InputError(f"{path}: joint {joint.name!r} is above itself; a URDF's links must form a tree")
+            raise InputError(f"{path}: joint {shown(joint.name)} is above itself; a URDF's links must form a tree")
         chain.insert(0, joint)
         link = joint.parent
     return chain
-
-
-def _check_joint(path: Path, joint: Joint) -> None:
-    if joint.type not in ("fixed", *_MOVABLE):
-        raise InputError(f"{path}: joint {joint.name!r} is of type {joint.type!r}; valid: fixed, {', '.join(_MOVABLE)}")
-    if joint.type in ("revolute", "prismatic"):
-        limit = joint.limit
-        if limit is None or limit.lower is None or limit.upper is None:
-            raise InputError(f"{path}: joint {joint.name!r} has no limits; add <limit lower=... upper=...>")
-        if not limit.lower <= limit.upper:
-            ends = f"from {limit.lower} to {limit.upper}"
-            raise InputError(f"{path}: joint {joint.name!r} has limits {ends}; give the lower one first")
-    if joint.type != "fixed" and not (np.isfinite(joint.axis).all() and np.linalg.norm(joint.axis) > 1e-9):
-        raise InputError(f"{path}: joint {joint.name!r} has axis {joint.axis}; give a direction")
 
 
 @dataclass(frozen=True)
@@ -120,9 +87,10 @@ def _drive(path: Path, joint: Joint, joints: Mapping[str, Joint]) -> _Drive:
         slope, shift = slope * (1.0 if factor is None else factor), shift + slope * (offset or 0.0)
         leader = joint.mimic.joint
         if leader not in joints or joints[leader].type == "fixed":
-            raise InputError(f"{path}: joint {joint.name!r} mimics {leader!r}, which is no movable joint of it")
+            raise InputError(f"{path}: joint {shown(joint.name)} mimics {shown(leader)}, which is no movable joint")
         if leader in followed:
-            raise InputError(f"{path}: mimic joints follow each other in a circle: {' -> '.join([*followed, leader])}")
+            circle = " -> ".join(str(name)[:40] for name in [*followed[-3:], leader])
+            raise InputError(f"{path}: mimic joints follow each other in a circle: {circle}")
         followed.append(leader)
         joint = joints[leader]
     return _Drive(joint.name, slope, shift)
@@ -134,12 +102,15 @@ def _tree(
     movable: Sequence[Joint],
     above: Mapping[str, Joint],
     links: Sequence[str],
+    carrying: Sequence[Joint],
 ) -> KinematicTree:
     by_name = {joint.name: joint for joint in robot.joints}
     drives = [_drive(path, joint, by_name) for joint in movable]
-    leaders = list(dict.fromkeys(drive.leader for drive in drives))
-    for name in leaders:
-        _check_joint(path, by_name[name])  # one may move none of the links itself
+    still = {_drive(path, joint, by_name).leader for joint in carrying}
+    everyone = list(dict.fromkeys(drive.leader for drive in drives))
+    for name in everyone:
+        check_joint(path, by_name[name])  # one may move none of the links itself
+    leaders = [name for name in everyone if name not in still]
     index = {joint.name: k for k, joint in enumerate(movable)}
     frames = [z_frame(np.asarray(joint.axis)) for joint in movable]
 
@@ -164,22 +135,26 @@ def _tree(
         parents.append(parent)
         rest.append(transform)
     points = [place(link) for link in links]
-    lower, upper = _limits(path, movable, drives, leaders, by_name)
+    found, overruled = _limits(path, movable, drives, everyone, by_name)
+    ranges = dict(zip(everyone, found, strict=True))
+    held = [d.slope * float(np.clip(0.0, *ranges[d.leader])) + d.shift for d in drives]
+    free = [d.leader not in still for d in drives]
     return KinematicTree(
-        rest_rotation=np.array([t[:3, :3] for t in rest], np.float32),
-        rest_position=np.array([t[:3, 3] for t in rest], np.float32),
-        slope=np.array([d.slope for d in drives], np.float32),
-        shift=np.array([d.shift for d in drives], np.float32),
-        lower=lower,
-        upper=upper,
+        rest_rotation=np.array([t[:3, :3] for t in rest], np.float32).reshape(-1, 3, 3),
+        rest_position=np.array([t[:3, 3] for t in rest], np.float32).reshape(-1, 3),
+        slope=np.array([d.slope if moves else 0.0 for d, moves in zip(drives, free, strict=True)], np.float32),
+        shift=np.array([d.shift if moves else h for d, h, moves in zip(drives, held, free, strict=True)], np.float32),
+        lower=np.array([ranges[name][0] for name in leaders], np.float32),
+        upper=np.array([ranges[name][1] for name in leaders], np.float32),
         point_position=np.array([t[:3, 3] for _, t in points], np.float32),
         parents=tuple(parents),
-        dofs=tuple(leaders.index(d.leader) for d in drives),
+        dofs=tuple(leaders.index(d.leader) if moves else HELD for d, moves in zip(drives, free, strict=True)),
         slides=tuple(joint.type == "prismatic" for joint in movable),
         point_joints=tuple(joint for joint, _ in points),
         dof_names=tuple(leaders),
         joint_names=tuple(joint.name for joint in movable),
         point_names=tuple(links),
+        overruled=tuple(overruled),
     )
 
 
@@ -193,17 +168,26 @@ def _limits(
     drives: Sequence[_Drive],
     leaders: Sequence[str],
     joints: Mapping[str, Joint],
-) -> tuple[np.ndarray, np.ndarray]:
-    """The range of each degree of freedom in which all joints that it drives keep their limits."""
-    lower, upper = np.full(len(leaders), -np.inf), np.full(len(leaders), np.inf)
-    driven = [*zip(movable, drives, strict=True), *((joints[name], _Drive(name, 1.0, 0.0)) for name in leaders)]
-    for joint, drive in driven:
-        if joint.type == "continuous" or joint.limit is None or drive.slope == 0:
+) -> tuple[list[tuple[float, float]], list[str]]:
+    """The range of each degree of freedom in which all joints that it drives keep their limits.
+
+    Also the mimic joints that would leave their leader one position: the SCHUNK hand's left URDF has one whose sign is
+    the right hand's: a finger that stands still serves nobody, and their limits do not count.
+    """
+    ranges, overruled = [limits_of(joints[name]) for name in leaders], []
+    for joint, drive in zip(movable, drives, strict=True):
+        if drive.slope == 0:
             continue
-        ends = sorted((np.array([joint.limit.lower, joint.limit.upper]) - drive.shift) / drive.slope)
+        ends = sorted((np.array(limits_of(joint)) - drive.shift) / drive.slope)
         k = leaders.index(drive.leader)
-        lower[k], upper[k] = max(lower[k], ends[0]), min(upper[k], ends[1])
-    for name, low, high in zip(leaders, lower, upper, strict=True):
-        if low > high + 1e-6:
-            raise InputError(f"{path}: the limits of {name!r} and its mimic joints exclude each other; fix the limits")
-    return lower.astype(np.float32), np.maximum(upper, lower).astype(np.float32)
+        low, high = ranges[k]
+        within = max(low, float(ends[0])), min(high, float(ends[1]))
+        if within[0] > within[1] + 1e-6:
+            raise InputError(
+                f"{path}: the limits of {shown(drive.leader)} and its mimic joints exclude each other; fix the limits"
+            )
+        if within[1] - within[0] < _POINT <= min(high - low, ends[1] - ends[0]):
+            overruled.append(joint.name)
+        else:
+            ranges[k] = within[0], max(within)
+    return ranges, overruled

@@ -49,6 +49,22 @@ def test_code_in_a_file_is_refused_by_name_and_not_run(tmp_path, kind):
     assert not (tmp_path / "made").exists()
 
 
+@pytest.mark.parametrize("suffix", [".PKL", ".Npy", ".NPZ"])
+def test_suffixes_in_capitals_are_the_same(tmp_path, suffix):
+    path = hidden_in(tmp_path, suffix.lower(), np.arange(3.0)).rename(tmp_path / f"file{suffix}")
+    assert read_contents(path).keys() & {"raw_mano", "right", "rhand"}
+
+
+@pytest.mark.parametrize("state", [{"a": 1}, (1, 2), None, 5, (1, (), "O", False, []), (1, (), None, 0, [1])])
+def test_an_array_of_objects_with_another_state_is_left_as_it_is(tmp_path, state):
+    array = pickle.dumps(np.array(None, dtype=object), 2)  # … the array's record, its state, and BUILD
+    start = array[: array.rindex(b"R") + 1]
+    path = tmp_path / "a.pkl"
+    path.write_bytes(start + pickle.dumps(state, 2)[2:-1] + b"b.")
+    with pytest.raises(InputError, match="cannot read 'a'"):
+        plain(path, "a", read_contents(path)[WHOLE])
+
+
 def test_code_in_a_tensors_own_bytes_is_refused_too(tmp_path):
     data = dumps({"a": Tensor(np.zeros(3, "f4"))})
     evil = pickle.dumps(Evil(tmp_path / "made"), 2)

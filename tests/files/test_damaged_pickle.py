@@ -82,9 +82,30 @@ def test_damaged_whole_files_load_or_raise_input_errors(tmp_path_factory, seed: 
         load_hand(path)
 
 
+@pytest.mark.parametrize("depth", [3, 1000, 10**5])
+def test_keys_that_are_no_names_are_refused(depth: int) -> None:
+    nested = b"N" + b"\x85" * depth  # ((None,),) and so on
+    for data in (b"}" + nested + b"Ns.", b"}(" + nested + b"Nu.", b"(" + nested + b"Nd."):
+        with pytest.raises(InputError, match="not a readable pickle"):
+            safe_pickle.read(b"\x80\x02" + data, "file")
+    for data in (b"\x8f(" + nested + b"\x90.", b"(" + nested + b"\x91."):  # sets
+        with pytest.raises(InputError, match="not a readable pickle"):
+            safe_pickle.read(b"\x80\x04" + data, "file")
+
+
+def test_names_numbers_and_pairs_of_them_are_keys() -> None:
+    value = {"a": 1, 2: 3, 2.5: None, None: {(1, "b"): {4, 5}}, True: bytearray(b"xy")}
+    assert safe_pickle.read(pickle.dumps(value, 5), "file") == value
+
+
 def test_a_huge_memo_index_or_length_takes_no_memory() -> None:
     tracemalloc.start()
-    for data in (b"\x80\x02Nr\xff\xff\xff\x7f.", b"\x80\x04\x8e" + (2**40).to_bytes(8, "little") + b"x."):
+    for data in (
+        b"\x80\x02Nr\xff\xff\xff\x7f.",
+        b"\x80\x04\x8e" + (2**40).to_bytes(8, "little") + b"x.",
+        b"\x80\x05\x96" + (3 * 10**9).to_bytes(8, "little") + b"x.",  # BYTEARRAY8
+        b"\x80\x05\x96" + (2**64 - 1).to_bytes(8, "little") + b"x.",
+    ):
         with pytest.raises(InputError):
             safe_pickle.read(data, "file")
     assert tracemalloc.get_traced_memory()[1] < 10**8

@@ -25,6 +25,24 @@ def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_a_symbolic_link_stays_and_what_it_names_is_written(tmp_path):
+    (tmp_path / "disk").mkdir()
+    target, link = tmp_path / "disk" / "real.npz", tmp_path / "link.npz"
+    link.symlink_to("disk/real.npz")
+    (tmp_path / "again.npz").symlink_to(link)
+    for path in (link, tmp_path / "again.npz"):  # the first writes where nothing is yet
+        save_arrays(path, "s/1", {"x": 1.0})
+        assert path.is_symlink()
+        assert not target.is_symlink()
+        assert load_arrays(target, "s/1")["x"] == 1.0
+        target.unlink()
+    assert sorted(p.name for p in tmp_path.rglob("*")) == ["again.npz", "disk", "link.npz"]
+    (tmp_path / "a.npz").symlink_to("b.npz")
+    (tmp_path / "b.npz").symlink_to("a.npz")
+    with pytest.raises(InputError, match="in a circle"):
+        save_arrays(tmp_path / "a.npz", "s/1", {"x": 1.0})
+
+
 def test_new_file_has_an_ordinary_files_mode(tmp_path):
     save_arrays(tmp_path / "a.npz", "s/1", {"x": 1.0})
     (tmp_path / "plain").touch()

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.sparse import csc_matrix
+from scipy.sparse import coo_matrix, csc_matrix
 
 from mjx_hand.errors import InputError
 from mjx_hand.files import safe_pickle
@@ -214,6 +214,8 @@ def test_python2_strings_become_arrays() -> None:
         ("indices", np.array([0, -1])),
         ("indptr", np.array([0, 1])),
         ("indptr", np.array([0, 9, 2])),
+        ("indptr", np.array([0, 1, 3 * 10**8])),
+        ("indptr", np.array([1, 2, 2])),
         ("_shape", (10**9, 2)),
         ("_shape", None),
         ("data", np.zeros(9)),
@@ -225,6 +227,26 @@ def test_contradictory_sparse_matrices_are_refused(part: str, value: Any) -> Non
     record = safe_pickle.read(pickle.dumps({"m": matrix}), "file")["m"]
     with pytest.raises((ValueError, TypeError)):
         safe_pickle.array(record)
+
+
+@pytest.mark.parametrize(
+    ("part", "value"),
+    [
+        ("_shape", (10**5, 10**5)),
+        ("_shape", (-2, -2)),
+        ("data", np.ones(3)),
+        ("coords", (np.array([0, 2]), np.array([0, 1]))),
+        ("coords", (np.array([0, -1]), np.array([0, 1]))),
+        ("coords", (np.array([0.0, 1.0]), np.array([0, 1]))),
+        ("coords", (np.array([0, 1]),)),
+    ],
+)
+def test_contradictory_lists_of_entries_are_refused(part: str, value: Any) -> None:
+    matrix = coo_matrix(np.eye(2))
+    assert np.array_equal(safe_pickle.array(safe_pickle.read(pickle.dumps({"m": matrix}), "f")["m"]), np.eye(2))
+    setattr(matrix, part, value)
+    with pytest.raises((ValueError, TypeError)):
+        safe_pickle.array(safe_pickle.read(pickle.dumps({"m": matrix}), "file")["m"])
 
 
 def test_selection_outside_its_source_is_refused() -> None:

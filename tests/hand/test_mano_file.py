@@ -1,10 +1,11 @@
+import os
 import pickle
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.sparse import csc_array, csr_matrix
+from scipy.sparse import coo_array, coo_matrix, csc_array, csc_matrix, csr_array, csr_matrix
 
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
@@ -73,6 +74,28 @@ def test_other_forms_of_the_regressor_load(tmp_path: Path, form) -> None:
     values = layout(HAND)
     values["J_regressor"] = form(values["J_regressor"])
     assert_same(load_hand(write(tmp_path / "m.pkl", pickle.dumps(values))), HAND)
+
+
+SPARSE = [csr_matrix, csc_matrix, coo_matrix, csr_array, csc_array, coo_array]
+
+
+@pytest.mark.parametrize("form", SPARSE, ids=[form.__name__ for form in SPARSE])
+def test_a_file_saved_from_the_pickle_as_it_is_loads(tmp_path: Path, form) -> None:
+    values = layout(HAND)
+    values["J_regressor"] = form(values["J_regressor"])
+    np.savez(tmp_path / "m.npz", **values)
+    assert_same(load_hand(tmp_path / "m.npz"), HAND)
+    assert_same(load_hand(write(tmp_path / "m.pkl", pickle.dumps(values))), HAND)
+
+
+def test_code_in_an_npz_is_refused_and_not_run(tmp_path: Path) -> None:
+    class Evil:
+        def __reduce__(self):
+            return os.mkdir, (str(tmp_path / "made"),)
+
+    with pytest.raises(InputError, match="nothing was run"):
+        load_hand(write_npz(HAND, tmp_path / "m.npz", J_regressor=np.array(Evil(), dtype=object)))
+    assert not (tmp_path / "made").exists()
 
 
 def test_big_endian_arrays_load(tmp_path: Path) -> None:

@@ -149,6 +149,22 @@ def test_names_that_would_meet_and_folders_that_cannot_be_used_are_refused(folde
         retarget_dataset(folder, tmp_path / "file" / "out", PLAIN)
 
 
+def test_capitals_and_linked_folders_are_recordings_too(folder, tmp_path):
+    (folder / "a.npz").rename(folder / "A.NPZ")
+    (folder / "deep").rename(tmp_path / "disk")
+    (folder / "deep").symlink_to(tmp_path / "disk")
+    (tmp_path / "disk" / "round").symlink_to(folder)  # and in a circle
+    (tmp_path / "disk" / "er" / "c.npz").unlink()
+    rows = retarget_dataset(folder, tmp_path / "out", PLAIN)
+    assert [(row.file, row.status) for row in rows] == [("A.NPZ", "done"), ("d.npz", "done"), ("deep/b.npz", "done")]
+    assert sorted(stamps(tmp_path / "out")) == ["A.npz", "d.npz", "deep/b.npz"]
+    (folder / "a.npz").write_bytes((folder / "d.npz").read_bytes())
+    retarget_dataset(folder, tmp_path / "out", PLAIN)  # A and a are two names
+    (folder / "A.npz").write_bytes((folder / "d.npz").read_bytes())
+    with pytest.raises(InputError, match="would have one output"):
+        retarget_dataset(folder, tmp_path / "out", PLAIN)
+
+
 def test_outputs_inside_the_folder_are_not_taken_for_recordings(folder):
     first = retarget_dataset(folder, folder / "angles", PLAIN)
     assert len(first) == 4

@@ -31,7 +31,8 @@ from mjx_hand.robots.robot_urdf import robot_tree
 from mjx_hand.robots.solver.keypoint_stream import KeypointStream
 from mjx_hand.robots.solver.kinematic_tree import KinematicTree, tree_points
 from mjx_hand.robots.solver.objectives import Objective
-from mjx_hand.robots.solver.retarget_keypoints import rest_posture, retarget_keypoints
+from mjx_hand.robots.solver.posture_samples import rest_posture
+from mjx_hand.robots.solver.retarget_keypoints import retarget_keypoints
 from train.reports.machine import machine
 
 Array = np.ndarray

@@ -50,7 +50,7 @@ def _sequences(contents: Contents) -> dict[str, Contents]:
 
 
 def _recognises(path: Path, contents: Contents) -> bool:
-    return path.suffix == ".npy" and any(_hands(one) for one in (contents, *_sequences(contents).values()))
+    return path.suffix.lower() == ".npy" and any(_hands(one) for one in (contents, *_sequences(contents).values()))
 
 
 def _chosen(path: Path, contents: Contents, request: Request) -> tuple[str, Contents]:
@@ -59,7 +59,7 @@ def _chosen(path: Path, contents: Contents, request: Request) -> tuple[str, Cont
     if not several:
         if request.sequence is not None:
             raise InputError(f"{path}: holds one recording; leave out sequence={request.sequence!r}")
-        return f"{path.absolute().parent.name}/{path.name.removesuffix('.npy').removesuffix('.mano')}", contents
+        return f"{path.absolute().parent.name}/{path.stem.removesuffix('.mano')}", contents
     if request.sequence not in several:
         names = ", ".join(sorted(several)[:_SHOWN]) + (", and more" if len(several) > _SHOWN else "")
         asked = "several sequences" if request.sequence is None else f"no sequence {request.sequence!r}"

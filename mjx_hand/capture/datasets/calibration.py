@@ -5,11 +5,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from jaxtyping import Float
 
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import numbers
+from mjx_hand.files.safe_yaml import read_yaml, shown
+
+FARTHEST = 1e4  # m; no camera is there
 
 
 def read_settings(path: Path, needed: Mapping[str, type]) -> dict[str, Any]:
@@ -24,16 +26,13 @@ def read_settings(path: Path, needed: Mapping[str, type]) -> dict[str, Any]:
     """
     if not path.is_file():
         raise InputError(f"{path}: no such file; keep the dataset's folders as they were published")
-    try:
-        found = yaml.safe_load(path.read_text())
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not readable YAML ({' '.join(str(error).split())})") from None
+    found = read_yaml(path)
     missing = [name for name in needed if not isinstance(found, dict) or name not in found]
     if missing:
         raise InputError(f"{path}: has no {missing[0]!r}; it needs {', '.join(needed)}")
     for name, kind in needed.items():
         if not isinstance(found[name], kind) or (kind is list and not found[name]):
-            raise InputError(f"{path}: {name} is {found[name]!r}, expected a {kind.__name__}"[:300])
+            raise InputError(f"{path}: {name} is {shown(found[name])}, expected a {kind.__name__}")
     return found
 
 
@@ -55,7 +54,7 @@ def transform(path: Path, name: str) -> Float[np.ndarray, "3 4"]:
     found = read_settings(path, {"extrinsics": dict})["extrinsics"]
     given = {name: _listed(found[name]).reshape(-1)} if name in found else {}
     matrix = numbers(path, given, {name: (12,)})[name].reshape(3, 4).astype(float)
-    if np.abs(matrix[:, :3] @ matrix[:, :3].T - np.eye(3)).max() > 1e-3:
+    if np.abs(matrix).max() > FARTHEST or np.abs(matrix[:, :3] @ matrix[:, :3].T - np.eye(3)).max() > 1e-3:
         raise InputError(f"{path}: {name} is not a rigid transform; get the calibration again")
     return matrix
 

@@ -47,7 +47,7 @@ def recording_files(folder: str | Path) -> tuple[Path, Path]:
         )
     found = []
     for ending in ("npz", "stl"):
-        files = sorted(folder.glob(f"*.{ending}"))
+        files = sorted(file for file in folder.iterdir() if file.suffix.lower() == f".{ending}")
         if len(files) != 1:
             raise InputError(f"{folder}: holds {len(files)} .{ending} files; a recording has one .npz and one .stl")
         found.append(files[0])

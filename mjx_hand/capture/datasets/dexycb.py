@@ -17,6 +17,7 @@ from pathlib import Path
 
 from mjx_hand.capture.datasets.calibration import betas, read_settings, transform
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
+from mjx_hand.capture.datasets.dataset_root import beside, one_name
 from mjx_hand.capture.datasets.mano_motion import chosen_side, mano_motion, recorded, some, turns
 from mjx_hand.capture.datasets.subject import full_pose, subject_of
 from mjx_hand.files.checked_arrays import numbers
@@ -34,22 +35,23 @@ def _read(path: Path, contents: Contents, request: Request) -> Motion:
     needed = {"num_frames": int, "mano_sides": list, "mano_calib": list, "extrinsics": str}
     meta = read_settings(path / "meta.yml", needed)
     side = chosen_side(path, meta["mano_sides"], request)
-    calibration = path.absolute().parent.parent / "calibration"
-    shape = betas(calibration / f"mano_{meta['mano_calib'][0]}" / "mano.yml")
-    table = transform(calibration / f"extrinsics_{meta['extrinsics']}" / "extrinsics.yml", "apriltag")
+    subject = one_name(path / "meta.yml", "mano_calib", meta["mano_calib"][0])
+    cameras = one_name(path / "meta.yml", "extrinsics", meta["extrinsics"])
+    shape = betas(beside(path, 2, f"calibration/mano_{subject}/mano.yml"))
+    table = transform(beside(path, 2, f"calibration/extrinsics_{cameras}/extrinsics.yml"), "apriltag")
 
     poses = numbers(path, read_contents(path / "pose.npz"), {"pose_m": (meta["num_frames"], 1, 51)}, finite=False)
     pose = poses["pose_m"][:, 0].astype(float)
     valid = some(path, recorded(path, pose) & (pose != 0).any(axis=1))
-    subject = subject_of(request, side, shape)
-    wrist = pose[:, 48:] + subject.wrist
+    hand = subject_of(request, side, shape)
+    wrist = pose[:, 48:] + hand.wrist
     return mano_motion(
         path,
         orientation=table[:, :3].T @ turns(pose[:, :3], valid),
         rotations=turns(full_pose(path, request, side, pose[:, 3:48], components=True, mean=True), valid),
         wrist=(wrist - table[:, 3]) @ table[:, :3],
         valid=valid,
-        subject=subject,
+        subject=hand,
         fps=FPS,
         side=side,
         source=f"DexYCB {path.absolute().parent.name}/{path.absolute().name}",

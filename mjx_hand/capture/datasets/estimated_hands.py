@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
+from mjx_hand.capture.datasets.mano_motion import refuse_wild
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import numbers
 from mjx_hand.files.contents import plain, unwrapped
@@ -77,6 +78,7 @@ def _mini(where: str, entry: dict[str, Any]) -> list[EstimatedHand]:
     found = _found(where, entry["wilor_preds"])
     layout = {"global_orient": (1, 1, 3), "hand_pose": (1, 15, 3)}
     vectors = np.concatenate(list(numbers(where, found, layout, finite=False).values()), axis=1).astype(float)
+    refuse_wild(where, vectors)
     finite = np.isfinite(vectors).all()
     rotations = Rotation.from_rotvec(vectors[0]).as_matrix() if finite else np.full((16, 3, 3), np.nan)
     return _made(where, found, right, rotations[None], np.eye(3)[None])
@@ -98,6 +100,7 @@ def _made(where: str, found: dict[str, Array], right: Array, rotations: Array, m
         joints = (
             numbers(where, found, {"pred_keypoints_3d": (count, 21, 3)}, finite=False)["pred_keypoints_3d"] @ mirror
         )
+    refuse_wild(where, rotations)
     given = rotations[np.isfinite(rotations).all(axis=(1, 2, 3))]
     off = np.abs(given @ np.swapaxes(given, -1, -2) - np.eye(3)).max(initial=0)
     if off > 0.01 or (np.linalg.det(given) < 0).any():  # half precision is off by 0.002

@@ -13,13 +13,14 @@ file finds that joint, and the others, in the subject's mesh, or in the mean han
 are in the capture system's frame. Body, object, table and contacts are not read.
 """
 
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
 import trimesh
 
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
+from mjx_hand.capture.datasets.dataset_root import beside
 from mjx_hand.capture.datasets.mano_motion import chosen_side, mano_motion, recorded, turns
 from mjx_hand.capture.datasets.subject import full_pose, subject_of
 from mjx_hand.errors import InputError
@@ -42,11 +43,19 @@ def _recognises(path: Path, contents: Contents) -> bool:
     return "framerate" in contents and bool(_hands(contents))
 
 
+def _text(value: Any) -> str:
+    """Text, whether Python's or NumPy's; none of anything else."""
+    found = value.item() if isinstance(value, np.ndarray) and value.size == 1 else value
+    return found if isinstance(found, str) and found.isprintable() else ""
+
+
 def _template(path: Path, hand: dict[str, Any]) -> np.ndarray | None:
     """The subject's rest vertices (m), if the mesh that the recording names is there."""
-    root = path.absolute().parent.parent.parent
-    mesh = root / str(hand.get("vtemp", ""))
-    if mesh.suffix != ".ply" or not mesh.resolve().is_relative_to(root) or not mesh.is_file():
+    named = PurePosixPath(_text(hand.get("vtemp")))
+    if named.is_absolute() or ".." in named.parts or named.suffix.lower() != ".ply":
+        return None
+    mesh = beside(path, 3, str(named))
+    if not mesh.is_file():
         return None
     try:
         vertices = np.asarray(trimesh.load_mesh(mesh, process=False).vertices, float)

@@ -39,7 +39,7 @@ from mjx_hand.motion import Motion
 
 def _files(path: Path) -> list[tuple[int | None, Path]]:
     """The files in a folder that may hold an image's output, each with the number that ends its name."""
-    files = sorted(file for file in path.iterdir() if file.suffix in (".npz", ".npy", *PICKLES))
+    files = sorted(file for file in path.iterdir() if file.suffix.lower() in (".npz", ".npy", *PICKLES))
     ends = [re.search(r"[0-9]+$", file.stem) for file in files]
     return [(int(end.group()) if end else None, file) for end, file in zip(ends, files, strict=True)]
 
@@ -73,6 +73,30 @@ def _images(path: Path, contents: Contents) -> dict[int, list[EstimatedHand]]:
     return {number: hands_in(str(file), _entry(read_contents(file))) for number, file in files.items()}
 
 
+def _one_each(path: Path, images: dict[int, list[EstimatedHand]], side: str) -> tuple[dict[int, EstimatedHand], int]:
+    """The hand of that side in each image, and how many images have more than one.
+
+    A detector takes something else for a second hand now and then. The hand is then the one that is nearest to where it
+    is in the images around, which have one.
+
+    Raises:
+        InputError: that is so in more than a third of the images: there are two persons.
+    """
+    own = {number: [hand for hand in hands if hand.side == side] for number, hands in images.items()}
+    chosen = {number: hands[0] for number, hands in own.items() if len(hands) == 1}
+    several = {number: hands for number, hands in own.items() if len(hands) > 1}
+    seen = sorted(number for number, hand in chosen.items() if np.isfinite(hand.translation).all())
+    if several and 2 * len(several) > len(seen):
+        number, hands = next(iter(several.items()))
+        raise InputError(f"{path}: image {number} has {len(hands)} {side} hands; keep one person's")
+    for number, hands in several.items():
+        places = np.array([[chosen[k].translation[axis] for k in seen] for axis in range(3)])
+        expected = np.array([np.interp(number, seen, place) for place in places])
+        away = [np.linalg.norm(hand.translation - expected) for hand in hands]
+        chosen[number] = hands[int(np.argmin(np.nan_to_num(away, nan=np.inf)))]
+    return chosen, len(several)
+
+
 def _read(path: Path, contents: Contents, request: Request) -> Motion:
     fps = frame_rate(path, request)
     images = _images(path, contents)
@@ -81,12 +105,9 @@ def _read(path: Path, contents: Contents, request: Request) -> Motion:
     ]
     side = chosen_side(path, present, request)
     rows = np.full((max(images) - min(images) + 1, 220), np.nan)
-    for number, hands in images.items():
-        own = [hand for hand in hands if hand.side == side]
-        if len(own) > 1:
-            raise InputError(f"{path}: image {number} has {len(own)} {side} hands; keep one person's")
-        if own:
-            rows[number - min(images)] = own[0].row()
+    chosen, left_out = _one_each(path, images, side)
+    for number, hand in chosen.items():
+        rows[number - min(images)] = hand.row()
 
     valid = some(path, recorded(path, rows[:, :157]))
     given = np.where(valid[:, None, None, None], rows[:, :144].reshape(-1, 16, 3, 3), np.eye(3))
@@ -107,7 +128,8 @@ def _read(path: Path, contents: Contents, request: Request) -> Motion:
         subject=subject,
         fps=fps,
         side=side,
-        source=f"HaMeR or WiLoR, {path.name}",
+        source=f"HaMeR or WiLoR, {path.name}"
+        + (f"; a second {side} hand left out of {left_out} images" if left_out else ""),
     )
 
 

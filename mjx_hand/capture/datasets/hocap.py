@@ -17,6 +17,7 @@ from pathlib import Path
 
 from mjx_hand.capture.datasets.calibration import betas, read_settings
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
+from mjx_hand.capture.datasets.dataset_root import beside, one_name
 from mjx_hand.capture.datasets.mano_motion import chosen_side, mano_motion, recorded, some, turns
 from mjx_hand.capture.datasets.subject import full_pose, subject_of
 from mjx_hand.errors import InputError
@@ -38,12 +39,12 @@ def _recognises(path: Path, contents: Contents) -> bool:
 
 def _calibration(path: Path, meta: dict) -> Path:
     """The subject's file of shape coefficients."""
-    folder = path.absolute().parent.parent / "calibration" / "mano"
     older = meta.get("calibration")
     subject = meta.get("subject_id") or (older.get("mano") if isinstance(older, dict) else None)
     if subject is None:
         raise InputError(f"{_meta(path)}: names no subject; it needs subject_id")
-    named = (folder / f"{subject}.yaml", folder / str(subject) / "mano.json")
+    name = one_name(_meta(path), "subject_id", subject)
+    named = [beside(path, 2, f"calibration/mano/{file}") for file in (f"{name}.yaml", f"{name}/mano.json")]
     return next((file for file in named if file.is_file()), named[0])
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float
 
-from mjx_hand.capture.datasets.subject import Subject
+from mjx_hand.capture.datasets.subject import Subject, check_shape
 from mjx_hand.capture.keypoints.layouts import LINK_KEYPOINTS, TIP_KEYPOINTS
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_LINKS, PARENTS, TIP_LINKS
@@ -44,8 +44,9 @@ def subject_with_joints(
         valid: the frames to use.
 
     Raises:
-        InputError: the joints do not follow from the rotations.
+        InputError: the joints do not follow from the rotations, or the coefficients are no hand's.
     """
+    check_shape(shape)
     places = joints[:, list(LINK_KEYPOINTS)]
     turned = [orientation]
     for link, parent in enumerate(PARENTS[1:]):

@@ -16,6 +16,7 @@ from mjx_hand.motion.resample import matrix_quaternions
 
 Array = np.ndarray
 LONGEST = 10**7  # frames: a day at 120 a second; frame numbers beyond it are damage
+FARTHEST = 1e4  # rad or m; no pose comes near
 
 
 def chosen_side(path: Path, present: Sequence[Any], request: Request) -> str:
@@ -51,11 +52,28 @@ def recorded(path: Path, *values: Array) -> Bool[Array, "t"]:
     """Which frames have finite numbers in all of `values`, each (t, ...).
 
     Raises:
-        InputError: none has.
+        InputError: none has, or a number is no angle and no place.
     """
     frames = len(values[0])
+    refuse_wild(path, *values)
     finite = [np.isfinite(v).reshape(frames, -1).all(axis=1) for v in values]
     return some(path, np.logical_and.reduce(finite))
+
+
+def refuse_wild(path: Path | str, *values: Array) -> None:
+    """Look whether `values`, each (t, ...), are angles (rad) and places (m), as far as they are finite.
+
+    Raises:
+        InputError: one is none.
+    """
+    for value in values:
+        wild = (np.abs(value) > FARTHEST) & np.isfinite(value)
+        if wild.any():
+            frame = int(np.argwhere(wild)[0][0])
+            raise InputError(
+                f"{path}: frame {frame} holds {value[wild][0]:.3g}, no angle (rad) and no place (m); "
+                "get the file again, or put NaN there"
+            )
 
 
 def some(path: Path, valid: Bool[Array, "t"]) -> Bool[Array, "t"]:

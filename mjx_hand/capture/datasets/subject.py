@@ -15,6 +15,7 @@ from mjx_hand.hand.load import load_hand
 from mjx_hand.hand.mano_file import load_mano_file
 
 Array = np.ndarray
+LARGEST_SHAPE = 100.0  # of coefficients whose standard deviation over people is 1
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,16 @@ class Subject:
     known: bool = True
 
 
+def check_shape(shape: Float[Array, "s"]) -> None:
+    """Look whether these are coefficients of a hand.
+
+    Raises:
+        InputError: they are far beyond any.
+    """
+    if (np.abs(shape) > LARGEST_SHAPE).any():
+        raise InputError(f"shape coefficients up to {np.abs(shape).max():.3g}; hands have -5 to 5: get the file again")
+
+
 def subject_of(
     request: Request, side: str, shape: Float[Array, "s"], *, as_shipped: bool = True, template: Array | None = None
 ) -> Subject:
@@ -55,8 +66,9 @@ def subject_of(
         template: (778, 3) the subject's own rest vertices (m), in place of coefficients.
 
     Raises:
-        InputError: the file cannot be used, or has fewer coefficients or other vertices.
+        InputError: the coefficients are no hand's, or the file cannot be used, or has fewer of them or other vertices.
     """
+    check_shape(shape)
     if request.mano is None:
         hand = load_hand(None, side)
         wrist = hand.joint_regressor[0] @ hand.template

@@ -76,7 +76,7 @@ def frame_rate(header: C3DHeader, parameters: Parameters) -> tuple[float | None,
     Then the one counts that the analog rate confirms, else POINT:RATE, as the manual has it.
     """
     point, analog = (
-        float(value[0]) if _is_count(value := parameters.get(group, {}).get("RATE")) else 0.0
+        float(value[0]) if (value := parameters.get(group, {}).get("RATE")) is not None and _is_count(value) else 0.0
         for group in ("POINT", "ANALOG")
     )
     rates = [rate for rate in (point, header.rate) if rate]

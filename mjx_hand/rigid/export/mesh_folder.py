@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from mjx_hand.errors import InputError
+from mjx_hand.files.npz_archive import followed
 from mjx_hand.hand.joints import LINKS
 from mjx_hand.rigid.export.hulls import convex_hulls, hull_name
 from mjx_hand.rigid.rigid_hand import RigidHand
@@ -27,7 +28,7 @@ def filling(folder: str | Path) -> Iterator[Path]:
     Raises:
         InputError: the folder cannot be made or written.
     """
-    folder = Path(folder)
+    folder = followed(Path(folder))
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         if folder.exists() and not folder.is_dir():

@@ -1,7 +1,7 @@
 """Keypoints onto a hand frame by frame, for teleoperation.
 
 `follow` is the pure step; `KeypointStream` keeps its state. Each frame starts from the one before it, so that a few
-iterations are enough.
+iterations are enough; the first one, and the first after a gap, from what it shows itself.
 """
 
 import jax
@@ -11,16 +11,30 @@ from jaxtyping import Array, Bool, Float
 
 from mjx_hand.errors import InputError
 from mjx_hand.pytree import pytree, replace
-from mjx_hand.robots.solver.alignment import aligned
 from mjx_hand.robots.solver.kinematic_tree import KinematicTree
 from mjx_hand.robots.solver.normal_equations import Posture
-from mjx_hand.robots.solver.objectives import Objective, brought_together, human_vectors, num_thumb_pairs, targets_of
+from mjx_hand.robots.solver.objectives import (
+    Objective,
+    Targets,
+    brought_together,
+    human_vectors,
+    num_thumb_pairs,
+    targets_of,
+)
+from mjx_hand.robots.solver.posture_samples import (
+    PostureSamples,
+    determined,
+    posture_samples,
+    rest_posture,
+    start_posture,
+)
 from mjx_hand.robots.solver.projected_newton import Holds, improve
-from mjx_hand.robots.solver.retarget_keypoints import enough, rest_posture
+from mjx_hand.robots.solver.retarget_keypoints import enough
+from mjx_hand.robots.solver.smoothing import UNIT, held_share
 from mjx_hand.rotations import exp, log, matrix_to_quaternion
 
-FIRST = 40  # iterations for the first frame, which starts from the rest posture
-NEXT = 5  # and for each one after it
+FIRST = 200  # iterations, at most, for a frame that follows none
+NEXT = 40  # and for each one after it; a hand that moves as hands do takes three to six
 
 
 @pytree
@@ -85,7 +99,9 @@ def follow(
     keypoints: Float[Array | np.ndarray, "21 3"],
     tree: KinematicTree,
     objective: Objective,
+    samples: PostureSamples,
     low_pass: float | Array,
+    share: float | Array,
     iterations: int | Array = NEXT,
 ) -> tuple[StreamState, StreamedPose]:
     """The state after one more frame, and what to show; a frame with too few keypoints changes nothing but `seen`.
@@ -94,39 +110,51 @@ def follow(
         state: of `start_state`, or after the frame before.
         keypoints: m; NaN where one is missing.
         tree, objective: the hand and what it is to do.
+        samples: its `posture_samples`.
         low_pass: share of the way from the pose shown before to the new one; 1 shows the new one.
-        iterations: of the solver. What they leave is made up for in the next frames.
+        share: of the smoothness, that holds a frame to the one before it; see `smoothing.held_share`.
+        iterations: of the solver, at most. What they leave is made up for in the next frames.
     """
     vectors = human_vectors(jnp.asarray(keypoints)[None], objective)
     together = brought_together(vectors, objective, jnp.ones(1, bool), state.together)
     targets = targets_of(vectors, objective, together)
     seen = enough(targets, objective)[0]
-    fitted = aligned(state.posture.values, targets, tree, objective)
-    begin = jax.tree.map(lambda known, new: jnp.where(state.started, known, new), state.posture, fitted)
+    begin = jax.lax.cond(
+        state.seen,
+        lambda: state.posture,
+        lambda: _afresh(state, targets, start_posture(targets, samples, tree, objective), tree, objective),
+    )
     holds = Holds(
-        anchor=state.posture.values,
-        strength=jnp.where(state.started, jnp.asarray(objective.smoothness), 0.0)[None],
+        anchor=jnp.asarray(state.posture.values),
+        strength=jnp.where(state.seen, share * jnp.asarray(objective.smoothness), 0.0)[None],
         linked=jnp.zeros(1),
     )
-    posture, value = improve(begin, targets, holds, tree, objective, jnp.where(state.started, iterations, FIRST))
-    shown = _part_way(state.shown, posture, jnp.where(state.started, low_pass, 1.0))
+    found = improve(begin, targets, holds, tree, objective, jnp.where(state.seen, iterations, FIRST))
+    posture = found.posture
+    shown = _part_way(state.shown, posture, jnp.where(state.seen, low_pass, 1.0))
     after = StreamState(
         posture=posture,
         shown=shown,
         together=together[:, 0],
         started=jnp.array(True),
         seen=jnp.array(True),
-        value=value[0],
+        value=found.value[0],
     )
     state = jax.tree.map(lambda new, old: jnp.where(seen, new, old), after, replace(state, seen=jnp.array(False)))
     pose = StreamedPose(
         dofs=state.shown.values[:, 0],
         base_position=state.shown.position[:, 0],
-        base_quaternion=matrix_to_quaternion(state.shown.rotation[..., 0]),
+        base_quaternion=matrix_to_quaternion(jnp.asarray(state.shown.rotation[..., 0])),
         value=state.value,
         seen=state.seen,
     )
     return state, pose
+
+
+def _afresh(state: StreamState, targets: Targets, start: Posture, tree: KinematicTree, objective: Objective) -> Posture:
+    """The start that a frame gives itself; what it does not show stays as it was."""
+    kept = state.started & ~determined(targets, tree, objective)
+    return replace(start, values=jnp.where(kept, state.posture.values, start.values))
 
 
 def _part_way(old: Posture, new: Posture, share: Array) -> Posture:
@@ -146,29 +174,42 @@ class KeypointStream:
     The first call compiles for some seconds, unless `warm_up` was called before.
     """
 
-    def __init__(self, tree: KinematicTree, objective: Objective, low_pass: float = 1.0, iterations: int = NEXT):
+    def __init__(
+        self,
+        tree: KinematicTree,
+        objective: Objective,
+        low_pass: float = 1.0,
+        iterations: int = NEXT,
+        fps: float | int = 30.0,
+    ):
         """Prepare to follow.
 
         Args:
             tree: the hand.
             objective: what it is to do.
-            low_pass: see `follow`; smaller is smoother and later.
-            iterations: for each frame after the first; more follow fast movements more closely, and take longer.
+            low_pass: share of the way from the pose shown to the new one that is gone in 1/30 s; smaller is smoother
+                and later.
+            iterations: for each frame after the first, at most; fewer take less time where the hand moves fast.
+            fps: frames per second, which say how much of low-pass and smoothness a frame feels.
 
         Raises:
-            InputError: `low_pass` is not in (0, 1], or no iterations.
+            InputError: `low_pass` is not in (0, 1], no iterations, or a rate that is none.
         """
         if iterations < 1:
             raise InputError(f"iterations is {iterations}; give at least 1")
         if not 0 < low_pass <= 1:
             raise InputError(f"low_pass is {low_pass}; give a number above 0 and up to 1, which filters nothing")
-        settings = (tree, objective, jnp.float32(low_pass), jnp.int32(iterations))
-        self._tree, self._objective, self._low_pass, self._iterations = jax.device_put(settings)
+        share = held_share(fps)
+        samples = posture_samples(tree, objective)
+        filtered = 1 - (1 - low_pass) ** (1 / (fps * UNIT))
+        numbers = (jnp.float32(filtered), jnp.float32(share), jnp.int32(iterations))
+        self._settings = jax.device_put((tree, objective, samples, *numbers))
         self.reset()
 
     def reset(self) -> None:
         """Forget all frames."""
-        self.state = start_state(self._tree, self._objective)
+        tree, objective, *_ = self._settings
+        self.state = start_state(tree, objective)
 
     def warm_up(self) -> None:
         """Compile, without following anything."""
@@ -189,4 +230,4 @@ class KeypointStream:
         return jax.tree.map(np.asarray, pose)
 
     def _follow(self, keypoints: np.ndarray) -> tuple[StreamState, StreamedPose]:
-        return follow(self.state, keypoints, self._tree, self._objective, self._low_pass, self._iterations)
+        return follow(self.state, keypoints, *self._settings)

@@ -16,6 +16,7 @@ from mjx_hand.pytree import pytree, static
 from mjx_hand.robots.solver.triples import Scalars, Triple, add, columns_times, times, turned_about_z
 
 BASE = -1  # as a joint's parent or a point's joint: the link that the hand hangs on
+HELD = -1  # as a joint's degree of freedom: none, it stands still
 
 
 @pytree
@@ -26,14 +27,15 @@ class KinematicTree:
 
     Attributes:
         rest_rotation, rest_position: each joint's frame in its parent's, at value zero.
-        slope, shift: a joint's value = slope * its degree of freedom + shift.
+        slope, shift: a joint's value = slope * its degree of freedom + shift; slope 0 for one that stands still.
         lower, upper: limits of the degrees of freedom; infinite where there is none.
         point_position: the points, in their joints' frames.
         parents: each joint's parent joint, or BASE.
-        dofs: the degree of freedom that drives each joint.
+        dofs: the degree of freedom that drives each joint, or HELD.
         slides: of each joint, whether it slides along its axis instead of turning about it.
         point_joints: the joint that carries each point, or BASE.
         dof_names, joint_names, point_names: what they are called.
+        overruled: tied joints whose limits do not count, since they would leave the others one position.
     """
 
     rest_rotation: Float[np.ndarray | Array, "j 3 3"]
@@ -50,6 +52,7 @@ class KinematicTree:
     dof_names: tuple[str, ...] = static()
     joint_names: tuple[str, ...] = static()
     point_names: tuple[str, ...] = static()
+    overruled: tuple[str, ...] = static(default=())
 
     @property
     def num_dofs(self) -> int:
@@ -127,7 +130,9 @@ def forward(values: Scalars, tree: KinematicTree, base: Base | None = None) -> P
         if parent in frames:
             turn = [columns_times(frames[parent], column) for column in turn]
         origin = carried(parent, [place[joint, k] for k in range(3)])
-        value = jnp.asarray(tree.slope)[joint] * values[tree.dofs[joint]] + jnp.asarray(tree.shift)[joint]
+        value = jnp.asarray(tree.shift)[joint]
+        if tree.dofs[joint] != HELD:
+            value = jnp.asarray(tree.slope)[joint] * values[tree.dofs[joint]] + value
         if tree.slides[joint]:
             frames[joint], origins[joint] = turn, add(origin, times(value, turn[2]))
         else:

@@ -12,10 +12,11 @@ Everything is unrolled over the tree when it is traced, so that products that ar
 from dataclasses import dataclass
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from mjx_hand.pytree import pytree
-from mjx_hand.robots.solver.kinematic_tree import Base, KinematicTree, Placed, ancestors, forward
+from mjx_hand.robots.solver.kinematic_tree import HELD, Base, KinematicTree, Placed, ancestors, forward
 from mjx_hand.robots.solver.objectives import Objective, Targets
 from mjx_hand.robots.solver.sparse_solve import Entries
 from mjx_hand.robots.solver.stages import stage
@@ -35,9 +36,9 @@ class Posture:
         rotation, position: frame from base; the identity and zero where the base does not move.
     """
 
-    values: Float[Array, "n b"]
-    rotation: Float[Array, "3 3 b"]
-    position: Float[Array, "3 b"]
+    values: Float[Array | np.ndarray, "n b"]
+    rotation: Float[Array | np.ndarray, "3 3 b"]
+    position: Float[Array | np.ndarray, "3 b"]
 
 
 @pytree
@@ -140,6 +141,8 @@ def _movers(point: int, placed: Placed, tree: KinematicTree, base: Base | None) 
         found += [_Mover(3 + k, 1.0, None, axis) for k, axis in enumerate(_AXES)]
         found += [_Mover(k, 1.0, axis, cross(axis, lever)) for k, axis in enumerate(_AXES)]
     for joint in ancestors(tree, tree.point_joints[point]):
+        if tree.dofs[joint] == HELD:
+            continue
         axis, slope, unknown = placed.axes[joint], jnp.asarray(tree.slope)[joint], first + tree.dofs[joint]
         if tree.slides[joint]:
             found.append(_Mover(unknown, slope, None, times(slope, axis)))

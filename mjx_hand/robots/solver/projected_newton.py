@@ -6,11 +6,10 @@ step and are clipped to their limits. A frame whose objective a step does not lo
 Each iteration looks at one place only, which serves the test of the step before and the next step.
 """
 
-from typing import Any
-
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
 
 from mjx_hand.pytree import pytree, replace
 from mjx_hand.robots.solver.kinematic_tree import KinematicTree
@@ -27,6 +26,7 @@ FLOOR = 0.02  # least pivot, of Gauss and Newton's stiffness
 _LEAST_STIFFNESS = 1e-6  # of an unknown that nothing holds
 LONGEST = 0.5  # rad or m; beyond it the objective's quadratic model says nothing
 _AT_LIMIT = 1e-6
+NEAR = 3e-4  # rad or m; a step shorter than that ends a search
 
 
 @pytree
@@ -36,7 +36,7 @@ class Holds:
     Attributes:
         anchor: where they are held, for every frame.
         strength: of each frame's hold; `strength` · ‖values - anchor‖² is added to the objective.
-        linked: 1 where a frame follows the one before it in the batch and `smoothness` holds the two together, else 0.
+        linked: how much of `smoothness` holds a frame and the one before it in the batch together, 0 for none.
     """
 
     anchor: Float[Array, "n b"]
@@ -46,12 +46,28 @@ class Holds:
 
 @pytree
 class _Search:
-    """The best place so far and the step being tried from it."""
+    """The best place so far, the step being tried from it, and the most that it moves any unknown by."""
 
     best: Posture
     step: Float[Array, "u b"]
     value: Float[Array, "b"]
     damping: Float[Array, "b"]
+    left: Float[Array, "b"]
+
+
+@pytree
+class Improved:
+    """What a search found.
+
+    Attributes:
+        posture: the best place.
+        value: the objective there, without holds and smoothness.
+        left: how far (rad or m) the next step would move the unknown that it moves most.
+    """
+
+    posture: Posture
+    value: Float[Array | np.ndarray, "b"]
+    left: Float[Array | np.ndarray, "b"]
 
 
 def improve(
@@ -61,18 +77,25 @@ def improve(
     tree: KinematicTree,
     objective: Objective,
     iterations: int | Int[Array, ""],
-) -> tuple[Posture, Float[Array, "b"]]:
-    """The postures after a number of iterations, and the objective's value there, without holds and smoothness.
+    near: float | Float[Array, ""] = NEAR,
+) -> Improved:
+    """The postures where the next step is smaller than `near`, or that are reached after a number of iterations.
+
+    A frame that has arrived rests while others of the batch go on: alone it would end in the same place.
 
     Args:
         start: within the limits.
         targets, holds: what to follow and where to stay.
         tree, objective: the hand and what is asked of it.
-        iterations: one or more.
+        iterations: at most; one or more.
+        near: rad or m; 0 for all iterations.
     """
     count, batch = tree.num_dofs + FREE * objective.free_base, start.values.shape[1]
 
-    def iterate(_: Any, search: _Search) -> _Search:
+    def goes_on(search: _Search) -> Bool[Array, "b"]:
+        return ~(search.left < near)
+
+    def iterate(search: _Search) -> _Search:
         tried = _moved(search.best, search.step, tree, objective)
         equations = linearise(tried, targets, tree, objective)
         anchor, strength = _held(search.best, holds, objective)
@@ -80,21 +103,31 @@ def improve(
         better = value + _pull(tried, anchor, strength) <= search.value + _pull(search.best, anchor, strength)
         damping = jnp.clip(search.damping * jnp.where(better, ACCEPTED, REJECTED), LEAST_DAMPING, MOST_DAMPING)
         step = _step(tried, equations, anchor, strength, damping, tree, objective)
-        return _Search(
-            best=jax.tree.map(lambda new, old: jnp.where(better, new, old), tried, search.best),
-            step=jnp.where(better, step, SHORTER * search.step),
+        step = jnp.where(better, step, SHORTER * search.step)
+        best = jax.tree.map(lambda new, old: jnp.where(better, new, old), tried, search.best)
+        after = _Search(
+            best=best,
+            step=step,
             value=jnp.where(better, value, search.value),
             damping=damping,
+            left=_reach(best, step, tree, objective),
         )
+        moving = goes_on(search)
+        return jax.tree.map(lambda new, old: jnp.where(moving, new, old), after, search)
 
     begin = _Search(
         best=start,
         step=jnp.zeros((count, batch)),
         value=jnp.full((batch,), jnp.inf),
         damping=jnp.full((batch,), INITIAL_DAMPING / ACCEPTED),
+        left=jnp.full((batch,), jnp.inf),
     )
-    search = jax.lax.fori_loop(0, iterations, iterate, begin)
-    return search.best, search.value
+    _, search = jax.lax.while_loop(
+        lambda state: (state[0] < iterations) & goes_on(state[1]).any(),
+        lambda state: (state[0] + 1, iterate(state[1])),
+        (jnp.zeros((), jnp.int32), begin),
+    )
+    return Improved(posture=search.best, value=search.value, left=search.left)
 
 
 def _moved(posture: Posture, step: Float[Array, "u b"], tree: KinematicTree, objective: Objective) -> Posture:
@@ -109,12 +142,21 @@ def _moved(posture: Posture, step: Float[Array, "u b"], tree: KinematicTree, obj
     )
 
 
+def _reach(best: Posture, step: Float[Array, "u b"], tree: KinematicTree, objective: Objective) -> Float[Array, "b"]:
+    """How far a step moves the unknown that it moves most, limits kept."""
+    first = FREE * objective.free_base
+    lower, upper = jnp.asarray(tree.lower)[:, None], jnp.asarray(tree.upper)[:, None]
+    moved = jnp.clip(best.values + step[first:], lower, upper) - best.values
+    return jnp.max(jnp.abs(jnp.concatenate([step[:first], moved])), axis=0)
+
+
 def _held(best: Posture, holds: Holds, objective: Objective) -> tuple[Float[Array, "n b"], Float[Array, "b"]]:
     """Anchor and strength of all holds on a frame: its own, and the frames before and after as they are now."""
-    before, after = holds.linked, jnp.roll(holds.linked, -1).at[-1].set(0.0)
-    neighbours = before * jnp.roll(best.values, 1, axis=1) + after * jnp.roll(best.values, -1, axis=1)
+    # One neighbour alone would pull a hand that moves back, or on: a frame is held between two or not at all.
+    both = jnp.minimum(holds.linked, jnp.roll(holds.linked, -1).at[-1].set(0.0))
+    neighbours = both * (jnp.roll(best.values, 1, axis=1) + jnp.roll(best.values, -1, axis=1))
     smoothness = jnp.asarray(objective.smoothness)
-    strength = holds.strength + smoothness * (before + after)
+    strength = holds.strength + smoothness * 2 * both
     anchor = (holds.strength * holds.anchor + smoothness * neighbours) / jnp.maximum(strength, 1e-20)
     return anchor, strength
 

@@ -1,22 +1,24 @@
-"""Recordings of 21 keypoints onto any hand: all frames at once, coarse in time first.
+"""Recordings of 21 keypoints onto any hand: each frame on its own evidence, then frames held to their neighbours.
 
-Every eighth frame is solved from the rest posture; between them the result is interpolated, which is so near that a few
-steps of all frames together finish it. Neighbouring frames hold each other as `Objective.smoothness` says.
+First every frame is solved alone, from a start that its own targets give (`posture_samples`), until its steps vanish:
+which other frames there are, how many a second, and where gaps lie changes nothing. A degree of freedom that nothing
+shows in a frame takes its value from the frames before and after. Then some steps of all frames together hold
+neighbours to each other, as `Objective.smoothness` says: per second, whatever the rate is.
 """
 
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from mjx_hand.errors import InputError
 from mjx_hand.motion.gaps import fill_lines, fill_turns
-from mjx_hand.motion.resample import interpolation_index
 from mjx_hand.pytree import pytree
-from mjx_hand.robots.solver.alignment import aligned
 from mjx_hand.robots.solver.kinematic_tree import KinematicTree
 from mjx_hand.robots.solver.normal_equations import Posture
 from mjx_hand.robots.solver.objectives import (
@@ -27,13 +29,17 @@ from mjx_hand.robots.solver.objectives import (
     num_thumb_pairs,
     targets_of,
 )
-from mjx_hand.robots.solver.projected_newton import Holds, improve
+from mjx_hand.robots.solver.posture_samples import determined, placed, posture_samples, range_posture, start_posture
+from mjx_hand.robots.solver.projected_newton import NEAR, Holds, Improved, improve
+from mjx_hand.robots.solver.smoothing import held_share, links
 from mjx_hand.rotations import matrix_to_quaternion
 
 CHUNK = 256  # frames solved in one call: its arrays stay in the processor's cache
-STRIDE = 8  # frames between those that are solved first
-COARSE, FINE = 40, 5  # iterations of those, and then of all frames
-REST_HOLD = 1e-8  # draws degrees of freedom that nothing else determines to the rest posture
+ROUNDS = (8, 16, 32, 64, 128)  # iterations; after each, frames that have arrived leave the others
+OTHER_STARTS = (0.1, 0.9, 0.3, 0.7)  # of each range, for positions that are not reached
+REACHED = 1e-7  # of the objective; below it each point is within half a millimetre
+TOGETHER, WITH_BASE = 4, 12  # iterations of neighbours that hold each other; where the base makes up for joints
+REST_HOLD = 1e-8  # draws degrees of freedom that nothing else determines to where they begin
 
 
 @pytree
@@ -55,20 +61,12 @@ class Followed:
     valid: Bool[np.ndarray, "*b t"]
 
 
-def rest_posture(tree: KinematicTree) -> Float[Array, "n"]:
-    """Where a search begins: the middle of each range; zero, as near as the limits allow, where a range has no end."""
-    lower, upper = jnp.asarray(tree.lower), jnp.asarray(tree.upper)
-    bounded = jnp.isfinite(lower) & jnp.isfinite(upper)
-    return jnp.where(bounded, (lower + upper) / 2, jnp.clip(0.0, lower, upper))
-
-
 def retarget_keypoints(
     keypoints: np.ndarray | Array,
     tree: KinematicTree,
     objective: Objective,
     *,
-    coarse: int = COARSE,
-    fine: int = FINE,
+    fps: float | int = 30.0,
 ) -> Followed:
     """Follow recordings of keypoints; leading axes are recordings of one length, solved side by side.
 
@@ -77,32 +75,38 @@ def retarget_keypoints(
             missing. For an objective whose base stands still, in the base's frame (`palm_frame.in_palm`).
         tree: the hand.
         objective: what it is to do.
-        coarse, fine: iterations of every eighth frame, then of all.
+        fps: frames per second, which say how much of the smoothness neighbours feel.
 
     Raises:
-        InputError: no frames, not 21 keypoints, infinite or huge coordinates, no frame with enough keypoints, or
-            iterations out of range.
+        InputError: no frames, not 21 keypoints, infinite or huge coordinates, no frame with enough keypoints, or a
+            rate that is none.
     """
-    if not (coarse > 0 and 0 < fine <= CHUNK // 4):
-        raise InputError(f"coarse and fine are {coarse} and {fine}; give at least 1, and fine up to {CHUNK // 4}")
+    share = held_share(fps)
     given = check_keypoints(keypoints)
     *batch, frames = given.shape[:-2]
     flat = jnp.asarray(given.reshape(-1, *given.shape[-2:]), jnp.float32)
-    linked = np.ones((flat.shape[0] // frames, frames), bool)
-    linked[:, 0] = False
-    targets, seen = _targets(flat, jnp.asarray(linked.ravel()), objective)
+    first = np.arange(len(flat)) % frames == 0
+    targets, seen = _targets(flat, jnp.asarray(~first), objective)
     valid = np.asarray(seen).reshape(*batch, frames)
     if not valid.any(axis=-1).all():
         raise InputError("keypoints: no frame of a recording shows enough of them to follow; give other frames")
-    posture, value = _solve(targets, valid.ravel(), frames, tree, objective, coarse, fine)
-    quaternion = np.asarray(matrix_to_quaternion(jnp.moveaxis(posture.rotation, -1, 0)))
-    rows = (posture.values.T, posture.position.T, quaternion)
-    dofs, position, turn = (np.asarray(r, float).reshape(*batch, frames, r.shape[-1]) for r in rows)
+    chosen = np.flatnonzero(seen)
+    targets = jax.tree.map(lambda a: np.asarray(a)[..., chosen], targets)
+    found = _alone(targets, tree, objective)
+    values = _with_unseen_filled(np.asarray(found.posture.values), targets, chosen, frames, tree, objective)
+    linked = share * links(values, np.diff(chosen, prepend=-1) == 1, first[chosen])
+    found = _together(found, values, targets, linked, tree, objective)
+
+    quaternion = np.asarray(matrix_to_quaternion(jnp.moveaxis(jnp.asarray(found.posture.rotation), -1, 0)))
+    rows = (found.posture.values.T, found.posture.position.T, quaternion, found.value[:, None])
+    dofs, position, turn, value = (
+        _everywhere(np.asarray(r, float), chosen, len(flat)).reshape(*batch, frames, r.shape[-1]) for r in rows
+    )
     return Followed(
         dofs=_per_recording(fill_lines, dofs, valid),
         base_position=_per_recording(fill_lines, position, valid),
         base_quaternion=_per_recording(fill_turns, turn, valid),
-        value=np.where(valid, np.asarray(value, float).reshape(*batch, frames), 0.0),
+        value=value[..., 0],
         valid=valid,
     )
 
@@ -145,72 +149,135 @@ def _targets(
     return targets, enough(targets, objective)
 
 
-def _solve(
-    targets: Targets,
-    seen: Bool[np.ndarray, "b"],
-    frames: int,
-    tree: KinematicTree,
-    objective: Objective,
-    coarse: int,
-    fine: int,
-) -> tuple[Posture, Float[np.ndarray, "b"]]:
-    """All recordings, of `frames` frames each, from nothing. Frames in gaps hold none beside them."""
-    targets = jax.tree.map(np.asarray, targets)
+def _alone(targets: Targets, tree: KinematicTree, objective: Objective) -> Improved:
+    """Every frame for itself, until its steps vanish."""
+    parameters = jax.device_put((tree, objective))
+    samples = jax.device_put(posture_samples(tree, objective))
+    start = _in_chunks(lambda part: start_posture(part, samples, *parameters), targets)
+    found = _converged(start, targets, parameters)
+    if objective.kind != "position":
+        return found
+    # With a base that moves there are dead ends; where one may be, other starts are tried.
+    for share in OTHER_STARTS:
+        behind = np.flatnonzero(found.value > REACHED)
+        if not len(behind):
+            break
+        part = jax.tree.map(lambda a: a[..., behind], targets)  # noqa: B023  used at once
+        values = np.repeat(range_posture(tree, share)[:, None], len(behind), axis=1)
+        begin = _in_chunks(lambda both: placed(*both, *parameters), (values, part))
+        again = _converged(begin, part, parameters)
+        better = np.flatnonzero(again.value < found.value[behind])
+        chosen = jax.tree.map(lambda a: a[..., better], again)  # noqa: B023
+        found = jax.tree.map(lambda old, new: _put(old, behind[better], new), found, chosen)  # noqa: B023
+    return found
+
+
+def _converged(start: Posture, targets: Targets, parameters: tuple[KinematicTree, Objective]) -> Improved:
     count = targets.weights.shape[-1]
-    few = np.unique([*range(0, frames, STRIDE), frames - 1])
-    chosen = (np.arange(0, count, frames)[:, None] + few).ravel()
-    rest = np.tile(np.asarray(rest_posture(tree))[:, None], len(chosen))
-    sparse = jax.tree.map(lambda a: a[..., chosen], targets)
-    found, _ = _in_chunks(rest, sparse, np.zeros(len(chosen), np.float32), tree, objective, coarse, 0)
-    before, after, share = interpolation_index(few.astype(float), np.arange(frames, dtype=float))
-    values = np.asarray(found.values).reshape(tree.num_dofs, -1, len(few))
-    between = (1 - share) * values[..., before] + share * values[..., after]
-    linked = (np.tile(np.arange(frames) > 0, count // frames) & seen & np.roll(seen, 1)).astype(np.float32)
-    return _in_chunks(between.reshape(tree.num_dofs, -1), targets, linked, tree, objective, fine, fine)
+    found = Improved(posture=start, value=np.zeros(count, np.float32), left=np.full(count, np.inf, np.float32))
+    for iterations in ROUNDS:
+        going = np.flatnonzero(~(found.left < NEAR))
+        if not len(going):
+            break
+        part = jax.tree.map(lambda a: a[..., going], (found.posture, targets))  # noqa: B023  used at once
+
+        def onwards(part: tuple[Posture, Targets], iterations: int = iterations) -> Improved:
+            return solve_chunk(*part, np.zeros(CHUNK, np.float32), *parameters, iterations, NEAR)
+
+        after = _in_chunks(onwards, part)
+        found = jax.tree.map(lambda old, new: _put(old, going, new), found, after)  # noqa: B023
+    return found
 
 
-def _in_chunks(
-    start: Float[np.ndarray, "n b"],
+def _together(
+    found: Improved,
+    values: Float[np.ndarray, "n b"],
     targets: Targets,
     linked: Float[np.ndarray, "b"],
     tree: KinematicTree,
     objective: Objective,
-    iterations: int,
-    margin: int,
-) -> tuple[Posture, Float[np.ndarray, "b"]]:
-    """Frames in chunks of one size, which overlap by twice `margin` frames.
+) -> Improved:
+    """All frames from there, with these degrees of freedom, neighbours holding each other.
 
     What a frame does reaches one neighbour an iteration: with a margin of as many frames as there are iterations the
     result is the same as that of all frames at once.
     """
-    count, inner = len(linked), CHUNK - 2 * margin
+    start = Posture(values=values, rotation=found.posture.rotation, position=found.posture.position)
+    if not (linked * float(np.asarray(objective.smoothness))).any():
+        return Improved(posture=start, value=found.value, left=found.left)
+    parameters = jax.device_put((tree, objective))
+    steps = WITH_BASE if objective.free_base else TOGETHER
+    return _in_chunks(lambda part: solve_chunk(*part, *parameters, steps, 0.0), (start, targets, linked), margin=steps)
+
+
+def _with_unseen_filled(
+    values: Float[np.ndarray, "n b"],
+    targets: Targets,
+    chosen: Int[np.ndarray, "b"],
+    frames: int,
+    tree: KinematicTree,
+    objective: Objective,
+) -> Float[np.ndarray, "n b"]:
+    """Degrees of freedom that nothing shows, on lines between the frames of their recording where something does."""
+    known = np.asarray(determined(targets, tree, objective))
+    if known.all():
+        return values
+    values = values.copy()
+    for recording in np.unique(chosen[~known.all(axis=0)] // frames):
+        own = np.flatnonzero(chosen // frames == recording)
+        for n in np.flatnonzero(~known[:, own].all(axis=1)):
+            shown = own[known[n, own]]
+            if len(shown):
+                values[n, own] = np.interp(chosen[own], chosen[shown], values[n, shown])
+    return values
+
+
+def _put(old: np.ndarray, at: Int[np.ndarray, "k"], new: np.ndarray) -> np.ndarray:
+    changed = np.array(old)
+    changed[..., at] = new
+    return changed
+
+
+def _everywhere(rows: Float[np.ndarray, "b n"], at: Int[np.ndarray, "b"], count: int) -> Float[np.ndarray, "t n"]:
+    """`rows` at their places, zero elsewhere."""
+    whole = np.zeros((count, rows.shape[1]))
+    whole[at] = rows
+    return whole
+
+
+def _in_chunks(function: Callable[[Any], Any], arrays: Any, margin: int = 0) -> Any:
+    """`function` of arrays whose last axis is the frames, in chunks of one size that overlap by twice `margin`."""
+    count, inner = jax.tree.leaves(arrays)[0].shape[-1], CHUNK - 2 * margin
     places = range(0, count, inner)
     behind = len(places) * inner - count + margin
-    frames = (start.astype(np.float32), targets, linked)
-    padded = jax.tree.map(lambda a: np.pad(a, [(0, 0)] * (a.ndim - 1) + [(margin, behind)]), frames)
-    parameters = jax.device_put((tree, objective))
+    # What fills up the last chunk: nothing, so that it holds no frame; where none are held, what ends as they do.
+    mode = "constant" if margin else "edge"
+    padded = jax.tree.map(
+        lambda a: np.pad(np.asarray(a), [(0, 0)] * (np.ndim(a) - 1) + [(margin, behind)], mode=mode), arrays
+    )
 
-    def one(first: int) -> tuple[Posture, np.ndarray]:
-        solved = solve_chunk(*jax.tree.map(lambda a: a[..., first : first + CHUNK], padded), *parameters, iterations)
-        return jax.tree.map(lambda a: np.asarray(a)[..., margin : margin + inner], solved)
+    def one(first: int) -> Any:
+        made = function(jax.tree.map(lambda a: a[..., first : first + CHUNK], padded))
+        return jax.tree.map(lambda a: np.asarray(a)[..., margin : margin + inner], made)
 
     with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:  # JAX runs one such call on one core
-        solved = list(pool.map(one, places))
-    return jax.tree.map(lambda *parts: np.concatenate(parts, axis=-1)[..., :count], *solved)
+        made = list(pool.map(one, places))
+    return jax.tree.map(lambda *parts: np.concatenate(parts, axis=-1)[..., :count], *made)
 
 
 @jax.jit
 def solve_chunk(
-    start: Float[Array | np.ndarray, "n b"],
+    start: Posture,
     targets: Targets,
     linked: Float[Array | np.ndarray, "b"],
     tree: KinematicTree,
     objective: Objective,
     iterations: int | Array,
-) -> tuple[Posture, Float[Array, "b"]]:
-    """Frames from given degrees of freedom, a base that moves from where it fits these best."""
-    targets = jax.tree.map(jnp.asarray, targets)
-    posture = aligned(jnp.asarray(start), targets, tree, objective)
-    rest = jnp.broadcast_to(rest_posture(tree)[:, None], start.shape)
-    holds = Holds(anchor=rest, strength=jnp.full(rest.shape[1], REST_HOLD), linked=jnp.asarray(linked))
-    return improve(posture, targets, holds, tree, objective, iterations)
+    near: float | Array,
+) -> Improved:
+    """Frames from given postures."""
+    start, targets = jax.tree.map(jnp.asarray, (start, targets))
+    values = jnp.asarray(start.values)
+    strength = jnp.full(values.shape[1], REST_HOLD)
+    holds = Holds(anchor=values, strength=strength, linked=jnp.asarray(linked))
+    return improve(start, targets, holds, tree, objective, iterations, near)

@@ -81,7 +81,7 @@ def test_folders_that_do_not_fit_together(tmp_path, meta, message):
 @pytest.mark.parametrize(
     ("file", "text", "message"),
     [
-        ("meta.yml", "serials: [a", "not readable YAML"),
+        ("meta.yml", "serials: [a", "not YAML"),
         ("meta.yml", "serials: []", "has no 'num_frames'; it needs num_frames, mano_sides, mano_calib, extrinsics"),
         ("../../calibration/extrinsics_20201014_121801/extrinsics.yml", "extrinsics: {}", "has no 'apriltag'"),
         (

@@ -152,6 +152,30 @@ def test_half_precision_is_near_enough(tmp_path):
     np.testing.assert_allclose(load_motion(path, fps=30).rotations, MATRICES[:, 1:], atol=2e-3)
 
 
+def doubled(k: int, place: float, first: bool = False) -> dict:
+    """Image k with a second right hand, `place` metres away, before or after the true one."""
+    image = output(k, ("right", "right"))
+    false = 0 if first else 1
+    image["pred_cam_t_full"] = image["pred_cam_t_full"] + np.eye(2)[false][:, None] * place
+    image["pred_mano_params"]["hand_pose"] = np.array(image["pred_mano_params"]["hand_pose"])
+    image["pred_mano_params"]["hand_pose"][false] = np.eye(3)
+    return image
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_a_false_second_detection_is_left_out_and_told(tmp_path, first):
+    images = [output(k) for k in range(FRAMES)]
+    images[2], images[5] = doubled(2, 0.4, first), doubled(5, 0.4, first)
+    for k, image in enumerate(images):  # a hand that moves slowly, and not as a random one does
+        image["pred_cam_t_full"] = image["pred_cam_t_full"] - TAKE.translation[k] + [0.01 * k, 0.0, 0.6]
+    path = tmp_path / "video.pkl"
+    path.write_bytes(pickle.dumps(images))
+    motion = load_motion(path, fps=30)
+    np.testing.assert_allclose(motion.rotations, MATRICES[:, 1:], atol=1e-6)
+    assert motion.valid.all()
+    assert "a second right hand left out of 2 images" in motion.source
+
+
 def spoiled(change) -> list:
     images = [output(k) for k in range(FRAMES)]
     change(images[1])

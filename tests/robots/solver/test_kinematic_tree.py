@@ -79,16 +79,16 @@ def test_a_robot_hand_is_one_file(tmp_path):
 
 
 URDF = """<robot name="r"><link name="base"/><link name="a"/><link name="b"/><link name="c"/>
-<joint name="one" type="{one}"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/>{limit}{mimic_one}</joint>
+<joint name="one" type="{one}"><parent link="base"/><child link="a"/>{axis}{limit}{mimic_one}</joint>
 <joint name="two" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/>
 <limit lower="-1" upper="1" effort="1" velocity="1"/>{mimic_two}</joint>
 <joint name="three" type="fixed"><parent link="base"/><child link="c"/></joint></robot>"""
 LIMIT = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
 
 
-def written(tmp_path, one="revolute", limit=LIMIT, mimic_one="", mimic_two=""):
+def written(tmp_path, one="revolute", axis='<axis xyz="0 0 1"/>', limit=LIMIT, mimic_one="", mimic_two=""):
     path = tmp_path / "robot.urdf"
-    path.write_text(URDF.format(one=one, limit=limit, mimic_one=mimic_one, mimic_two=mimic_two))
+    path.write_text(URDF.format(one=one, axis=axis, limit=limit, mimic_one=mimic_one, mimic_two=mimic_two))
     return path
 
 
@@ -116,12 +116,38 @@ def test_tied_joints_share_a_degree_of_freedom_and_its_limits(tmp_path):
         ({"mimic_one": '<mimic joint="two"/>', "mimic_two": '<mimic joint="one"/>'}, ["b"], "in a circle: one -> two"),
         ({"mimic_two": '<mimic joint="four"/>'}, ["b"], "mimics 'four', which is no movable joint"),
         ({"mimic_two": '<mimic joint="one" offset="9"/>'}, ["b"], "exclude each other"),
+        ({"limit": '<limit effort="1" velocity="1"/>'}, ["b"], "'one' has no limits"),
+        ({"axis": '<axis xyz="1 0"/>'}, ["b"], r"'one' has axis \[1.0, 0.0\]; give a direction of three"),
+        ({"axis": '<axis xyz="0 0 0"/>'}, ["b"], "give a direction of three"),
+        ({"axis": '<axis xyz="1 x 0"/>'}, ["b"], "not a URDF that can be read"),
+        ({"axis": '<origin xyz="1 0"/>'}, ["b"], "not a URDF that can be read|no place"),
+        ({"axis": '<origin xyz="nan 0 0"/>'}, ["b"], "no place"),
+        ({"mimic_two": '<mimic joint="one" multiplier="nan"/>'}, ["b"], "mimics by nan"),
+        ({"one": "x" * 100000}, ["b"], "is of type 'xxx"),
+        ({"mimic_two": f'<mimic joint="{"y" * 100000}"/>'}, ["b"], "mimics 'yyy"),
+        ({}, ["z" * 100000], "has no link 'zzz"),
     ],
 )
 def test_urdfs_that_cannot_be_used_are_refused_in_one_line(tmp_path, changes, links, message):
     with pytest.raises(InputError, match=message) as caught:
         robot_tree(written(tmp_path, **changes), links)
     assert "\n" not in str(caught.value)
+    assert len(str(caught.value).replace(str(tmp_path), "")) < 400
+
+
+def test_limits_that_leave_a_finger_one_position_do_not_count(tmp_path):
+    """Joint two is at 1 + one, and may be at -1 to 1: one, which may be at 0 to 1, would stay at 0."""
+    tied = '<mimic joint="one" offset="1"/>'
+    tree = robot_tree(written(tmp_path, limit='<limit upper="1"/>', mimic_two=tied), ["b"])
+    np.testing.assert_allclose((tree.lower, tree.upper), [[0.0], [1.0]])
+    assert tree.overruled == ("two",)
+    assert robot_tree(written(tmp_path, mimic_two='<mimic joint="one" offset="0.5"/>'), ["b"]).overruled == ()
+
+
+@pytest.mark.parametrize(("limit", "ends"), [('lower="-0.5"', (-0.5, 0)), ('upper="0.5"', (0, 0.5))])
+def test_a_limit_that_is_left_out_is_0(tmp_path, limit, ends):
+    tree = robot_tree(written(tmp_path, limit=f"<limit {limit}/>"), ["a"])
+    np.testing.assert_allclose((tree.lower[0], tree.upper[0]), ends)
 
 
 @pytest.mark.parametrize("content", ["", "no xml", "<robot/>", "<mujoco/>", URDF[: len(URDF) // 2]])

@@ -171,8 +171,9 @@ def test_bad_keypoints_are_refused_in_one_line(inspire):
         with pytest.raises(InputError, match=message) as caught:
             retarget_keypoints(keypoints, tree, objective)
         assert "\n" not in str(caught.value)
-    with pytest.raises(InputError, match="coarse and fine"):
-        retarget_keypoints(np.zeros((4, 21, 3)), tree, objective, fine=200)
+    for fps in (0, -30.0, float("nan"), float("inf")):
+        with pytest.raises(InputError, match="give the frames per second"):
+            retarget_keypoints(np.zeros((4, 21, 3)), tree, objective, fps=fps)
     with pytest.raises(InputError, match="low_pass"):
         KeypointStream(tree, objective, low_pass=0.0)
     with pytest.raises(InputError, match="one frame of 21 x 3"):
