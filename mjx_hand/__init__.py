@@ -11,7 +11,10 @@ lists the public names.
 """
 
 from mjx_hand.lazy_exports import lazy_exports
+from mjx_hand.stopping import stop_quietly
 
 __version__ = "0.2.0"
+
+stop_quietly()
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)  # type: ignore[assignment]  # the stub's names

@@ -72,9 +72,16 @@ def listed(own: Mapping[str, str], key: str, otherwise: Sequence[str]) -> list[s
     return list(dict.fromkeys(names))
 
 
+def _is_finished(config: Config) -> bool:
+    try:
+        return is_finished(config, load_curve(config.out))
+    except InputError:  # damaged: the training writes it anew
+        return False
+
+
 def measure(configs: Sequence[Config]) -> Experiment:
     """Train and evaluate one experiment; what was done before with the same settings is taken as it is."""
-    finished = all(is_finished(config, load_curve(config.out)) for config in configs)
+    finished = all(_is_finished(config) for config in configs)
     folder = shared_folder(configs)
     summary = cached_results(configs) if finished and not configs[0].fresh else None
     if summary is None:

@@ -1,5 +1,6 @@
 """What is known of a file, for people: its kind, its facts, and the commands that take it further."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -58,6 +59,8 @@ def file_facts(
     Raises:
         InputError: there is no such file, it is damaged, or nothing here reads it.
     """
+    if fps is not None and not 0 < fps < math.inf:
+        raise InputError(f"fps is {fps}; give frames per second, a number above 0")
     if not path.exists():
         raise InputError(f"{path}: no such file; give the path of a recording, a hand or a robot description")
     if path.is_file() and path.stat().st_size == 0:

@@ -58,4 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # whoever read the output has seen enough, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # Python flushes once more as it ends
         return 1
+    except OSError as error:  # a path that the system cannot use: too long a name, no permission, a full disk
+        print(f"mjx-hand: {InputError(error)}", file=sys.stderr)
+        return 2
     return status or 0

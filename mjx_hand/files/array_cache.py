@@ -31,9 +31,6 @@ def cached(compute: Callable[[], Mapping[str, np.ndarray]], *ingredients: Any) -
     Args:
         compute: a function of the ingredients alone.
         ingredients: pytrees of arrays, numbers, strings and bytes.
-
-    Raises:
-        InputError: they cannot be written.
     """
     cache = _cache()
     if cache is None:
@@ -41,7 +38,7 @@ def cached(compute: Callable[[], Mapping[str, np.ndarray]], *ingredients: Any) -
     path = Path(cache) / _FOLDER / f"{_digest(ingredients)}.npz"
     if path.is_file():
         try:
-            arrays = load_arrays(path, SCHEMA)
+            arrays = dict(load_arrays(path, SCHEMA))  # all are read here, where damage is caught
         except InputError:  # damaged, as an archive's checksums tell: it is made anew
             pass
         else:
@@ -49,7 +46,10 @@ def cached(compute: Callable[[], Mapping[str, np.ndarray]], *ingredients: Any) -
                 os.utime(path)
             return arrays
     arrays = compute()
-    save_arrays(path, SCHEMA, arrays)
+    try:
+        save_arrays(path, SCHEMA, arrays)
+    except InputError:  # a full disk: it is computed again next time
+        return arrays
     with contextlib.suppress(FileNotFoundError):  # another process tidies up too
         for old in sorted(path.parent.glob("[!.]*.npz"), key=lambda file: file.stat().st_mtime)[:-_MOST]:
             old.unlink()

@@ -44,6 +44,8 @@ def numbers(
             expected = ", ".join(map(str, known))
             raise InputError(f"{path}: {name} has shape {value.shape}, expected ({expected})")
         sizes |= {d: n for d, n in zip(wanted, value.shape, strict=True) if isinstance(d, str)}
+        if value.dtype.kind == "f" and value.dtype.itemsize > 8:
+            value = value.astype(float)  # long doubles, which nothing here computes with
         if finite and not np.isfinite(value).all():
             where = tuple(int(i) for i in np.argwhere(~np.isfinite(value))[0])
             raise InputError(f"{path}: {name} has NaN or infinity, first at {where}; repair or leave out those frames")
@@ -55,8 +57,27 @@ def text(path: str | Path, arrays: Mapping[str, np.ndarray], name: str) -> str:
     """The string of that name.
 
     Raises:
-        InputError: it is missing.
+        InputError: it is missing, or is not one string.
     """
+    return _strings(path, arrays, name, 0).item()
+
+
+def texts(path: str | Path, arrays: Mapping[str, np.ndarray], name: str) -> tuple[str, ...]:
+    """The list of strings of that name.
+
+    Raises:
+        InputError: it is missing, or is not a list of strings.
+    """
+    return tuple(_strings(path, arrays, name, 1).tolist())
+
+
+def _strings(path: str | Path, arrays: Mapping[str, np.ndarray], name: str, ndim: int) -> np.ndarray:
     if name not in arrays:
         raise InputError(f"{path}: has no {name!r}")
-    return str(arrays[name])
+    value = np.asarray(arrays[name])
+    if value.dtype.kind != "U" or value.ndim != ndim:
+        raise InputError(
+            f"{path}: {name} holds {value.dtype} of shape {value.shape}, expected "
+            f"{'one text' if ndim == 0 else 'a list of texts'}"
+        )
+    return value

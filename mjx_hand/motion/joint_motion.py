@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from mjx_hand.errors import InputError
-from mjx_hand.files.checked_arrays import numbers, text
+from mjx_hand.files.checked_arrays import numbers, text, texts
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 from mjx_hand.hand.joints import HINGES, NUM_HINGES
 from mjx_hand.pytree import pytree, static
@@ -84,7 +84,7 @@ def joint_motion_of(path: str | Path, arrays: Mapping[str, np.ndarray], source: 
     Raises:
         InputError: arrays are missing, unsound, or made for another joint order.
     """
-    if tuple(arrays.get("joint_names", ())) != HINGES:
+    if "joint_names" not in arrays or texts(path, arrays, "joint_names") != HINGES:
         raise InputError(f"{path}: its joint names are not this version's; make it again from the recording")
     n = numbers(path, arrays, LAYOUT)
     fps, side = float(n["fps"]), text(path, arrays, "side")

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from mjx_hand.errors import InputError
-from mjx_hand.files.checked_arrays import numbers, text
+from mjx_hand.files.checked_arrays import numbers, text, texts
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 from mjx_hand.motion.resample import quaternion_matrices
 from mjx_hand.pytree import pytree, static
@@ -62,7 +62,7 @@ def load_robot_motion(path: str | Path) -> RobotMotion:
         InputError: not such a file, or its arrays are not sound.
     """
     arrays = load_arrays(path, SCHEMA)
-    names = tuple(str(name) for name in np.atleast_1d(arrays.get("joint_names", ())))
+    names = texts(path, arrays, "joint_names")
     layout = {"fps": (), "angles": ("t", len(names)), "base_position": ("t", 3), "base_quaternion": ("t", 4)}
     n = numbers(path, arrays, {**layout, "valid": ("t",)})
     if not names or n["fps"] <= 0:

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from mjx_hand.capture.keypoints.layouts import KEYPOINTS, NUM_KEYPOINTS
 from mjx_hand.errors import InputError
-from mjx_hand.files.checked_arrays import numbers, text
+from mjx_hand.files.checked_arrays import numbers, text, texts
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 from mjx_hand.pytree import pytree, static
 
@@ -87,7 +87,7 @@ def load_keypoint_file(path: str | Path) -> KeypointRecording:
         InputError: not such a file, or made for another order of keypoints.
     """
     a = load_arrays(path, SCHEMA)
-    if tuple(str(name) for name in np.atleast_1d(a.get("names", ()))) != KEYPOINTS:
+    if "names" not in a or texts(path, a, "names") != KEYPOINTS:
         raise InputError(f"{path}: its keypoints' names are not this version's; make it again from the recording")
     n = numbers(path, a, {"fps": (), "positions": ("t", NUM_KEYPOINTS, 3)}, finite=False)
     return check_keypoints(
