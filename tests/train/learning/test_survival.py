@@ -158,7 +158,7 @@ def test_what_was_lost_is_made_again_from_the_state(trained: Trained, tiny: Conf
     run(config, env)
     assert {name: (tmp_path / name).read_bytes() for name in whole} == whole
     same_results(trained[0], tmp_path)
-    assert not [path for path in tmp_path.rglob(".*")]
+    assert not list(tmp_path.rglob(".*"))
 
 
 def test_states_belong_to_their_settings(tiny: Config, env: TrackingEnv, tmp_path, capsys):
