@@ -40,6 +40,9 @@ def run_command(name: str, text: str, argv: Sequence[str] | None, task: Callable
     except InputError as error:
         print(f"{name}: {error}", file=sys.stderr)
         return 2
+    except OSError as error:  # a path that the system cannot use: too long a name, no permission, a full disk
+        print(f"{name}: {InputError(error)}", file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         print(f"\n{name}: stopped; the same command goes on from here", file=sys.stderr)
         return 130

@@ -99,7 +99,6 @@ def tabulate(results: Sequence[tuple[str, dict[str, Any]]]) -> str:
     lines.append("|---|---|---|---|---|---|---|---|---|---|---|")
     for name in names:
         o = rows[name].outcomes
-        kinds = ("read", "refused", "exception", "death", "message", "escaped", "memory", "time")
         cells = [o[kind] for kind in kinds]
         lines.append(f"| {name} | {rows[name].files} | {' | '.join(map(str, cells))} | {rows[name].slowest:.2f} |")
     return "\n".join(lines)

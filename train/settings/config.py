@@ -1,12 +1,15 @@
 """The typed configuration of an experiment, composed by Hydra from `configs/`, checked before anything is compiled."""
 
+import contextlib
 import dataclasses
 import difflib
+import io
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import hydra
+from hydra._internal.utils import get_args_parser
 from hydra.core.config_store import ConfigStore
 from omegaconf import DictConfig, ListConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
@@ -193,12 +196,26 @@ def _command(task: Callable[[DictConfig, Sequence[str]], object]) -> None:
     for old, new in old_names(arguments).items():
         print(f"train: {old} is called {new} now", file=sys.stderr)
     try:
+        _check_flags(arguments)
         if not any(argument.startswith("-") for argument in arguments):
             expand_seeds(_composed(arguments))
         sys.argv[1:] = completed(arguments)
     except InputError as error:
         refuse(error)
     hydra.main(version_base=None, config_path="pkg://configs", config_name="train")(job)()
+
+
+def _check_flags(arguments: Sequence[str]) -> None:
+    """Raise InputError for flags that Hydra does not have: it would print all of those that it has."""
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said):
+            get_args_parser().parse_args(list(arguments))
+    except SystemExit as end:
+        if not end.code:
+            raise
+        reason = (said.getvalue().strip().splitlines() or [""])[-1].partition("error: ")[2]
+        raise InputError(f"{reason or 'these flags are not known'}; options are written name=value") from None
 
 
 def refuse(error: InputError) -> None:

@@ -29,6 +29,8 @@ from websockets import Headers
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
+from mjx_hand.errors import InputError
+
 EVERYWHERE = ("", "0.0.0.0", "::")  # addresses that stand for all of this computer
 _LARGEST = 2**16  # bytes of a message; a control's value takes a hundred
 _LONGEST = 2**12  # letters of a text
@@ -67,6 +69,31 @@ def guarded_server(host: str, port: int, label: str) -> viser.ViserServer:
         raise RuntimeError(f"viser {viser.__version__} cannot be guarded; install viser 1.1")
     gate.server = server
     return server
+
+
+def free_port(host: str, port: int) -> int:
+    """The port, or for 0 one that is free; viser would silently take another where it is not.
+
+    Raises:
+        InputError: it is taken, or is none.
+    """
+    if not 0 <= port <= 65535:
+        raise InputError(f"cannot serve at {host}:{port}: ports are 0 to 65535; choose another --port")
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError as error:
+            raise InputError(f"cannot serve at {host}:{port}: {error.strerror}; choose another --port") from None
+        return probe.getsockname()[1]
+
+
+def is_public(host: str) -> bool:
+    """Whether other computers can reach a server that listens on this address."""
+    try:
+        return not ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host != "localhost"
 
 
 class _Gate:

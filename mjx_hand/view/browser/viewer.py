@@ -2,8 +2,6 @@
 
 import contextlib
 import io
-import ipaddress
-import socket
 import sys
 import threading
 import time
@@ -16,7 +14,7 @@ from viser import uplot
 
 from mjx_hand.errors import InputError
 from mjx_hand.pytree import replace
-from mjx_hand.view.browser.gate import EVERYWHERE, guarded_server
+from mjx_hand.view.browser.gate import EVERYWHERE, free_port, guarded_server, is_public
 from mjx_hand.view.browser.nodes import Handle, Show, add_layer
 from mjx_hand.view.browser.playback import SPEEDS, Playback
 from mjx_hand.view.browser.scene import Scene, check_scene, positions
@@ -52,7 +50,7 @@ class Viewer:
             InputError: the scene cannot be shown, or the port is not free.
         """
         self.scene = check_scene(scene)
-        free = _free_port(host, port)
+        free = free_port(host, port)
         with contextlib.redirect_stdout(io.StringIO()):  # viser's banner; whoever asked for a viewer says where it is
             self.server = guarded_server(host, free, "mjx-hand")
         self.host = host
@@ -79,10 +77,7 @@ class Viewer:
     @property
     def public(self) -> bool:
         """Whether other computers can look, and steer, too."""
-        try:
-            return not ipaddress.ip_address(self.host).is_loopback
-        except ValueError:
-            return self.host != "localhost"
+        return is_public(self.host)
 
     def show(self, frame: int) -> None:
         """Show a frame; playing goes on from there."""
@@ -262,19 +257,6 @@ def serving(scene: Scene, port: int = PORT, host: str = "127.0.0.1") -> Iterator
         yield viewer
     finally:
         viewer.close()
-
-
-def _free_port(host: str, port: int) -> int:
-    """The port, or for 0 one that is free; viser would silently take another where it is not."""
-    if not 0 <= port <= 65535:
-        raise InputError(f"cannot serve at {host}:{port}: ports are 0 to 65535; choose another --port")
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, port))
-        except OSError as error:
-            raise InputError(f"cannot serve at {host}:{port}: {error.strerror}; choose another --port") from None
-        return probe.getsockname()[1]
 
 
 def _bounds(scene: Scene) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
