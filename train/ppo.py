@@ -32,6 +32,7 @@ from train.learning.sweep import sweepable_command
 from train.learning.unstable import UnstableLog
 from train.settings.config import Config
 from train.settings.device import described
+from train.settings.peers import watching_others
 from train.settings.processes import agreed, first_alone_speaks, gathered, is_first, join
 from train.settings.saved import policy_settings
 
@@ -251,7 +252,7 @@ def _best(points: Sequence[Point]) -> Point:
 def main(config: Config) -> Mapping[str, str]:
     """Join the other processes, if there are any, and train; what the last evaluation said."""
     join(config.distributed)
-    with first_alone_speaks():
+    with watching_others(config.distributed), first_alone_speaks():
         last = train(config)[-1]
     return {
         "steps": f"{last.steps:,}",
