@@ -42,7 +42,7 @@ def stop_quietly() -> None:
 
 def is_program(words: Sequence[str]) -> bool:
     """Whether the words of a command line start a program of the project, as `sys.orig_argv` has them."""
-    for word, following in zip(words[1:], [*words[2:], ""], strict=True):
+    for word, following in zip(words[1:], [*words[2:], ""], strict=False):
         if not word.startswith("-"):
             return Path(word).stem == "mjx-hand"
         if word.endswith("m") and not word.startswith("--"):  # -m, -um

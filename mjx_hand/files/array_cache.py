@@ -31,6 +31,9 @@ def cached(compute: Callable[[], Mapping[str, np.ndarray]], *ingredients: Any) -
     Args:
         compute: a function of the ingredients alone.
         ingredients: pytrees of arrays, numbers, strings and bytes.
+
+    Raises:
+        InputError: they cannot be written.
     """
     cache = _cache()
     if cache is None:
@@ -46,10 +49,7 @@ def cached(compute: Callable[[], Mapping[str, np.ndarray]], *ingredients: Any) -
                 os.utime(path)
             return arrays
     arrays = compute()
-    try:
-        save_arrays(path, SCHEMA, arrays)
-    except InputError:  # a full disk: it is computed again next time
-        return arrays
+    save_arrays(path, SCHEMA, arrays)
     with contextlib.suppress(FileNotFoundError):  # another process tidies up too
         for old in sorted(path.parent.glob("[!.]*.npz"), key=lambda file: file.stat().st_mtime)[:-_MOST]:
             old.unlink()

@@ -6,13 +6,14 @@ from pathlib import Path
 import numpy as np
 
 from mjx_hand.errors import InputError
+from mjx_hand.files.npz_reader import Arrays
 
 Dimension = int | str
 
 
 def numbers(
     path: str | Path,
-    arrays: Mapping[str, np.ndarray],
+    arrays: Arrays,
     layout: Mapping[str, tuple[Dimension, ...]],
     *,
     finite: bool = True,
@@ -53,7 +54,7 @@ def numbers(
     return found
 
 
-def text(path: str | Path, arrays: Mapping[str, np.ndarray], name: str) -> str:
+def text(path: str | Path, arrays: Arrays, name: str) -> str:
     """The string of that name.
 
     Raises:
@@ -62,7 +63,7 @@ def text(path: str | Path, arrays: Mapping[str, np.ndarray], name: str) -> str:
     return _strings(path, arrays, name, 0).item()
 
 
-def texts(path: str | Path, arrays: Mapping[str, np.ndarray], name: str) -> tuple[str, ...]:
+def texts(path: str | Path, arrays: Arrays, name: str) -> tuple[str, ...]:
     """The list of strings of that name.
 
     Raises:
@@ -71,7 +72,7 @@ def texts(path: str | Path, arrays: Mapping[str, np.ndarray], name: str) -> tupl
     return tuple(_strings(path, arrays, name, 1).tolist())
 
 
-def _strings(path: str | Path, arrays: Mapping[str, np.ndarray], name: str, ndim: int) -> np.ndarray:
+def _strings(path: str | Path, arrays: Arrays, name: str, ndim: int) -> np.ndarray:
     if name not in arrays:
         raise InputError(f"{path}: has no {name!r}")
     value = np.asarray(arrays[name])

@@ -88,7 +88,17 @@ def save_arrays(path: str | Path, schema: str, arrays: Mapping[str, np.ndarray |
         np.savez_compressed(file, allow_pickle=False, schema=np.array(schema), **stored)
 
 
-def open_arrays(path: str | Path) -> Mapping[str, np.ndarray]:
+def open_arrays(path: str | Path) -> dict[str, np.ndarray]:
+    """All arrays of an `.npz` file, without pickle.
+
+    Raises:
+        InputError: the file is missing, is not an `.npz`, is damaged, is larger unpacked than it can be, or would need
+            pickle.
+    """
+    return dict(open_archive(path))
+
+
+def open_archive(path: str | Path) -> Archive:
     """The arrays of an `.npz` file, without pickle, each read when it is looked up.
 
     Raises:
@@ -115,22 +125,23 @@ def schema_of(path: str | Path) -> str:
         return ""
 
 
-def load_arrays(path: str | Path, schema: str) -> Mapping[str, np.ndarray]:
+def load_arrays(path: str | Path, schema: str) -> Archive:
     """Arrays of a file that `save_arrays` wrote with this schema, each read when it is looked up.
 
     Raises:
-        InputError: not such a file, or of another schema or version; looked up, as `open_arrays`.
+        InputError: not such a file, or of another schema or version; looked up, as `open_archive`.
     """
-    arrays = open_arrays(path)
+    arrays = open_archive(path)
     found = _schema(arrays)
     if found != schema:
         raise InputError(
             f"{path}: schema {found or 'none'}, expected {schema}; make it again with this version of mjx-hand"
         )
+    arrays.hide("schema")
     return arrays
 
 
-def _schema(arrays: Mapping[str, np.ndarray]) -> str:
+def _schema(arrays: Archive) -> str:
     value = arrays.get("schema", np.array(0))
     return value.item() if value.ndim == 0 and value.dtype.kind == "U" else ""
 

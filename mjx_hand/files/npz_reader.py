@@ -10,7 +10,7 @@ import warnings
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Union
 
 import numpy as np
 
@@ -21,6 +21,8 @@ _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # the two that NumPy writ
 _ENCRYPTED = 0x1
 _CODE_POINTS = 0x10FFFF
 _MOST_LETTERS = 60  # of a member's name in a message
+
+Arrays = Union["Archive", Mapping[str, np.ndarray]]  # what loaders take: of a file, or made otherwise
 
 
 class Archive(Mapping[str, Any]):
@@ -70,6 +72,10 @@ class Archive(Mapping[str, Any]):
                     f"{self._path}: not a readable .npz file ({_short(name)}: {reason_of(error)}); copy it again"
                 ) from None
         return self._found[name]
+
+    def hide(self, name: str) -> None:
+        """Hold no array of that name from now on."""
+        self._members.pop(name, None)
 
     def _read(self, member: zipfile.ZipInfo) -> Any:
         if member.compress_type not in _METHODS or member.flag_bits & _ENCRYPTED:

@@ -12,6 +12,7 @@ import numpy as np
 from mjx_hand.errors import InputError, reason_of
 from mjx_hand.files.checked_arrays import numbers, text
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
+from mjx_hand.files.npz_reader import Arrays
 
 SCHEMA = "mjx-hand/policy/1"
 
@@ -63,7 +64,7 @@ def is_saved(checkpoint: Checkpoint, path: str | Path) -> bool:
         arrays = dict(load_arrays(path, SCHEMA))
     except InputError:
         return False
-    wanted = {"schema": np.array(SCHEMA)} | {name: np.asarray(value) for name, value in _arrays(checkpoint).items()}
+    wanted = {name: np.asarray(value) for name, value in _arrays(checkpoint).items()}
     same = (a.dtype == b.dtype and a.tobytes() == b.tobytes() for a, b in ((arrays[n], wanted[n]) for n in wanted))
     return arrays.keys() == wanted.keys() and all(same)
 
@@ -91,6 +92,8 @@ def load_checkpoint(path: str | Path) -> Checkpoint:
                 node = node.setdefault(key, {})
                 if not isinstance(node, dict):
                     raise InputError(f"{path}: {name} is below another parameter; train it again")
+            if rest[-1] in node:
+                raise InputError(f"{path}: {name} holds other parameters; train it again")
             node[rest[-1]] = jnp.asarray(leaf)
     known = numbers(path, arrays, {"steps": (), "success": (), "observation_size": ()}, finite=False)
     if not np.isfinite([float(known[name]) for name in ("steps", "observation_size")]).all():
@@ -106,7 +109,7 @@ def load_checkpoint(path: str | Path) -> Checkpoint:
     )
 
 
-def _settings(path: str | Path, arrays: Mapping[str, np.ndarray]) -> Mapping[str, Any]:
+def _settings(path: str | Path, arrays: Arrays) -> Mapping[str, Any]:
     try:
         settings = json.loads(text(path, arrays, "settings"))
     except (ValueError, RecursionError) as error:

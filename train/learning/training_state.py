@@ -71,7 +71,6 @@ def load_run(
 
 def _read(path: Path, template: Any, check: Callable[[Mapping[str, Any]], None]) -> tuple[Any, dict[str, Any]]:
     arrays = dict(load_arrays(path, SCHEMA))
-    arrays.pop("schema")
     digest = text(path, arrays, "digest")
     del arrays["digest"]
     if digest != _digest(arrays):

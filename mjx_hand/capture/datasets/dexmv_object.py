@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import numbers
-from mjx_hand.files.npz_archive import open_arrays
+from mjx_hand.files.npz_archive import open_archive
 
 _LAYOUT: dict[str, tuple[int | str, ...]] = {"object_pose_objcam": ("t", 3, 4), "hand_cam_to_object_cam": (4, 4)}
 _WORST = 1e6  # condition of a movement's matrix; with metres beside cosines it is below a hundred
@@ -65,7 +65,7 @@ def load_object(recording: str | Path, mesh: str | Path) -> RecordedObject:
     Raises:
         InputError: a file is missing or damaged, or holds no object.
     """
-    n = numbers(recording, open_arrays(recording), _LAYOUT)
+    n = numbers(recording, open_archive(recording), _LAYOUT)
     to_object = n["hand_cam_to_object_cam"].astype(float)
     if not np.isfinite(np.linalg.cond(to_object)) or np.linalg.cond(to_object) > _WORST:
         raise InputError(f"{recording}: hand_cam_to_object_cam is no movement of a camera; copy the recording again")

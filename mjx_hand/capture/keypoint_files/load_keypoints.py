@@ -8,7 +8,7 @@ from mjx_hand.capture.keypoint_files.reader import KeypointReader, keypoint_read
 from mjx_hand.capture.keypoints.recording import KeypointRecording
 from mjx_hand.capture.keypoints.side import bent_side
 from mjx_hand.errors import InputError
-from mjx_hand.files.npz_archive import open_arrays
+from mjx_hand.files.npz_archive import open_archive
 from mjx_hand.pytree import replace
 
 
@@ -65,7 +65,7 @@ def keypoint_contents(path: Path) -> Any:
     """
     suffix = path.suffix.lower()
     if suffix == ".npz":
-        return open_arrays(path)
+        return open_archive(path)
     if suffix not in (".json", ".csv"):
         return None
     try:

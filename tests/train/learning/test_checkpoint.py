@@ -85,10 +85,13 @@ def test_members_of_other_kinds_are_refused(path, name, value):
 
 
 def test_whether_a_file_holds_a_checkpoint_already(path):
-    assert is_saved(load_checkpoint(path), path)
-    assert not is_saved(dataclasses.replace(load_checkpoint(path), steps=1), path)
+    kept = a_checkpoint()
+    assert not is_saved(kept, path), "its numbers are drawn anew"
+    save_checkpoint(kept, path)
+    assert is_saved(kept, path)
+    assert not is_saved(dataclasses.replace(kept, steps=1), path)
     path.write_bytes(path.read_bytes()[:-1])
-    assert not is_saved(a_checkpoint(), path)
+    assert not is_saved(kept, path)
 
 
 def test_success_that_was_not_evaluated_stays_nan(tmp_path):

@@ -64,7 +64,7 @@ def test_values_that_cannot_be_used_are_refused_in_a_line(override):
 
 def test_options_by_their_old_names_are_taken():
     assert (
-        compose(["task.finger=0.9", "+task.lost_at=0.2"]).task
+        compose(["task.finger=0.9", "task.lost_at=0.2"]).task
         == compose(["task.residual_scale_fingers=0.9", "task.termination_distance=0.2"]).task
     )
 
