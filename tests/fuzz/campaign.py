@@ -46,6 +46,7 @@ class _Worker:
             pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
             self.process = subprocess.Popen(command, cwd=_ROOT, **pipes)
             self.cases = json.loads(self._line(_START) or "[]")
+            assert self.cases, "the worker does not start"
         return self.process
 
     def ask(self, number: int) -> dict[str, Any]:
@@ -78,7 +79,7 @@ def outcomes(numbers: Sequence[int], folder: Path) -> Iterator[tuple[str, dict[s
         worker.start()
         for number in numbers:
             found = worker.ask(number)
-            yield worker.cases[number % len(worker.cases)][0] if worker.cases else "", found
+            yield worker.cases[number % len(worker.cases)][0], found
     finally:
         worker.stop()
 

@@ -149,7 +149,9 @@ def _markers(folder: Path) -> list[Valid]:
         path = write(_new(folder, f"markers {kind}") / f"a.{kind}", positions)
         found.append(_single(f"markers {kind.upper()}", path, "markers", "info"))
     path = _new(folder, "markers npz") / "a.npz"
-    save_recording(MarkerRecording(120.0, positions / 1000, np.ones((5, 3), bool), NAMES, "valid"), path)
+    seen = np.ones((5, 3), bool)
+    recording = MarkerRecording(fps=120.0, positions=positions / 1000, visible=seen, names=NAMES, source="valid")
+    save_recording(recording, path)
     found.append(_single("markers NPZ", path, "markers", "info"))
     path = _new(folder, "marker set") / "set.yaml"
     shutil.copy(Path(__file__).parents[2] / "mjx_hand/capture/markers/hand22.yaml", path)
@@ -260,7 +262,7 @@ def _hands(folder: Path) -> list[Valid]:
     (root / "robot.urdf").write_text(_urdf())
     tips = {f"{finger}_tip": f"{finger}_tip" for finger in DIGITS}
     described = {"palm": "palm", "scaling": 1.0, "fingers": [1.0, 0, 0], "palmar": [0, 0, 1.0], "tips": tips}
-    (root / "robot.yaml").write_text(yaml.safe_dump(described))
+    (root / "robot.yaml").write_text(yaml.safe_dump(described, sort_keys=False))
     found.append(Valid("URDF", root, "robot.urdf", "robot.urdf", ("robot", "info")))
     found.append(Valid("robot YAML", root, "robot.urdf", "robot.yaml", ("robot",)))
     return found

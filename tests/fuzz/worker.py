@@ -84,10 +84,13 @@ def main(folder: Path) -> None:
     """Serve the numbers of standard input."""
     sys.set_int_max_str_digits(4300)  # as every Python starts
     valid = write_valid(folder / "valid")
-    for k, case in enumerate(valid):  # as they are; and what is compiled or imported late is there from then on
-        for reader in case.readers:
-            outcome, text = read(case, reader, case.root / case.opened)
-            assert outcome == "read", f"{case.format} {k}, {reader}: {outcome} {text}"
+    as_they_are = [
+        (case, reader, *read(case, reader, case.root / case.opened)) for case in valid for reader in case.readers
+    ]
+    wrong = [
+        f"{case.format} {reader}: {outcome} {text}" for case, reader, outcome, text in as_they_are if outcome != "read"
+    ]
+    assert not wrong, "\n".join(wrong)  # and what is compiled or imported late is there from now on
     watch = _Watch(folder)
     size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (size + MEMORY, size + MEMORY))
