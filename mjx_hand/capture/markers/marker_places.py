@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import yaml
 from jaxtyping import Float
 
 from mjx_hand.errors import InputError
+from mjx_hand.files.safe_yaml import parse_yaml, shown
 from mjx_hand.hand.joints import FINGERS, LINKS, TIP_LINKS
 from mjx_hand.hand.model import HandModel
 
@@ -54,18 +54,6 @@ class MarkerPlace:
     labels: tuple[str, ...] = ()
 
 
-class _NoRepeats(yaml.SafeLoader):
-    """YAML as it is defined: a mapping has each key once. PyYAML would keep the last of two markers of one name."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict:
-        names: list[str] = [key.value for key, _ in node.value]
-        for k, (key, _) in enumerate(node.value):
-            if key.value in names[:k]:
-                problem = f"{key.value!r} is there twice; give each marker its own name"
-                raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
-        return super().construct_mapping(node, deep)
-
-
 def next_joint(joint: str) -> str:
     """The end of the bone that starts at `joint`; for the wrist, the middle finger's knuckle."""
     if joint == "wrist":
@@ -93,27 +81,24 @@ def parse_places(text: str, source: str) -> tuple[MarkerPlace, ...]:
     Raises:
         InputError: the text is not YAML or not of this form.
     """
-    try:
-        document = yaml.load(text, _NoRepeats)
-    except yaml.YAMLError as error:
-        raise InputError(f"{source}: not YAML ({' '.join(str(error).split())})") from None
+    document = parse_yaml(text, source)
     if not isinstance(document, Mapping) or not isinstance(document.get("markers"), Mapping) or not document["markers"]:
         raise InputError(f"{source}: not a marker set; give a mapping `markers` from names to places")
-    unknown = [str(key) for key in document if key not in ("markers", "offset", "within")]
+    unknown = [key for key in document if key not in ("markers", "offset", "within")]
     if unknown:
-        raise InputError(f"{source}: unknown entry {', '.join(unknown)}; valid are markers, offset, within")
+        raise InputError(f"{source}: unknown entry {shown(unknown[0])}; valid are markers, offset, within")
     common = {"offset": document.get("offset"), "within": document.get("within", WITHIN)}
     return tuple(parse_place(str(name), entry, common, source) for name, entry in document["markers"].items())
 
 
 def parse_place(name: str, entry: Any, common: Mapping[str, Any], source: str) -> MarkerPlace:
     """One marker's entry, checked."""
-    where = f"{source}: marker {name!r}"
+    where = f"{source}: marker {shown(name)}"
     if not isinstance(entry, Mapping):
-        raise InputError(f"{where}: {entry!r} is not a place; give for example {{joint: index2, facing: dorsal}}")
-    unknown = [str(key) for key in entry if key not in KEYS]
+        raise InputError(f"{where}: {shown(entry)} is not a place; give for example {{joint: index2, facing: dorsal}}")
+    unknown = [key for key in entry if key not in KEYS]
     if unknown:
-        raise InputError(f"{where}: unknown entry {', '.join(unknown)}; valid are {', '.join(KEYS)}")
+        raise InputError(f"{where}: unknown entry {shown(unknown[0])}; valid are {', '.join(KEYS)}")
     offset = number(where, "offset", entry.get("offset", common["offset"]), 0.05)
     within = number(where, "within", entry.get("within", common["within"]), 0.05)
     if within == 0:
@@ -143,21 +128,21 @@ def parse_labels(where: str, value: Any) -> tuple[str, ...]:
         try:
             re.compile(word)
         except (re.error, TypeError):
-            raise InputError(f"{where}: labels has {word!r}, which is not a regular expression; quote it") from None
+            raise InputError(f"{where}: labels has {shown(word)}, not a regular expression; quote it") from None
     return tuple(words)
 
 
 def choice(where: str, key: str, value: Any, valid: tuple[str, ...]) -> str:
     """`value` if it is one of the valid words."""
     if value not in valid:
-        raise InputError(f"{where}: {key} is {value!r}; valid are {', '.join(valid)}")
+        raise InputError(f"{where}: {key} is {shown(value)}; valid are {', '.join(valid)}")
     return value
 
 
 def number(where: str, key: str, value: Any, most: float) -> float:
     """`value` if it is a number from 0 to `most`."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= most:
-        raise InputError(f"{where}: {key} is {value!r}, expected a number from 0 to {most:g}")
+        raise InputError(f"{where}: {key} is {shown(value)}, expected a number from 0 to {most:g}")
     return float(value)
 
 
