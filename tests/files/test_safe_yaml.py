@@ -33,7 +33,7 @@ nested:
 
 
 def test_the_core_schema_knows_no_dates_and_no_base_60():
-    words = "2001-01-01 1:30:00 20200702_151821 5e-3 no 0x1F .5 -.inf 010".split()
+    words = ["2001-01-01", "1:30:00", "20200702_151821", "5e-3", "no", "0x1F", ".5", "-.inf", "010"]
     expected = ["2001-01-01", "1:30:00", "20200702_151821", 5e-3, "no", 31, 0.5, float("-inf"), 10]
     assert parse_yaml("\n".join(f"- {word}" for word in words), "x") == expected
     assert parse_yaml("[!!str 12, !!float 3, !!int 4, ! 5]", "x") == ["12", 3.0, 4, "5"]

@@ -94,10 +94,8 @@ def tabulate(results: Sequence[tuple[str, dict[str, Any]]]) -> str:
             row.outcomes[found["outcome"]] += 1
             row.slowest = max(row.slowest, found["seconds"])
     names = [*sorted(name for name in rows if name != "all"), "all"]
-    lines = [
-        "| format | files | read | refused | exception | death | message | code, files | memory | time | slowest (s) |"
-    ]
-    lines.append("|---|---|---|---|---|---|---|---|---|---|---|")
+    kinds = ("read", "refused", "exception", "death", "message", "escaped", "memory", "time")
+    lines = [f"| format | files | {' | '.join(kinds)} | slowest (s) |", "|---" * (len(kinds) + 3) + "|"]
     for name in names:
         o = rows[name].outcomes
         cells = [o[kind] for kind in kinds]

@@ -20,6 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
 from mjx_hand.capture.datasets.joint_places import offsets_in_parents
+from mjx_hand.capture.datasets.mano_motion import LARGEST
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import numbers
 from mjx_hand.hand.joints import FINGERS, LINKS, PARENTS, TIP_LINKS
@@ -82,7 +83,7 @@ def _read(path: Path, arrays: Contents, request: Request) -> Motion:
     frames = len(transforms)
     mano = numbers(path, arrays, {"mano": (frames, 61)}, finite=False)["mano"].astype(float)
     values = np.concatenate([mano, transforms.reshape(frames, len(LINKS) * 16)], axis=1)
-    valid = np.asarray(np.isfinite(values).all(axis=1))
+    valid = np.asarray((np.abs(values) < LARGEST).all(axis=1))
     if not valid.any():
         raise InputError(f"{path}: none of its {frames} frames is finite; nothing to read")
 

@@ -15,6 +15,7 @@ from mjx_hand.motion import Motion, check_motion
 from mjx_hand.motion.resample import matrix_quaternions
 
 Array = np.ndarray
+LARGEST = 1e6  # metres, radians, coefficients; numbers beyond it are damage
 LONGEST = 10**7  # frames: a day at 120 a second; frame numbers beyond it are damage
 
 
@@ -48,13 +49,13 @@ def frame_rate(path: Path, request: Request) -> float:
 
 
 def recorded(path: Path, *values: Array) -> Bool[Array, "t"]:
-    """Which frames have finite numbers in all of `values`, each (t, ...).
+    """Which frames have numbers that a hand's can be in all of `values`, each (t, ...): finite, and not huge.
 
     Raises:
         InputError: none has.
     """
     frames = len(values[0])
-    finite = [np.isfinite(v).reshape(frames, -1).all(axis=1) for v in values]
+    finite = [(np.abs(v) < LARGEST).reshape(frames, -1).all(axis=1) for v in values]
     return some(path, np.logical_and.reduce(finite))
 
 

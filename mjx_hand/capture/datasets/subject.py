@@ -16,6 +16,8 @@ from mjx_hand.hand.mano_file import load_mano_file
 
 Array = np.ndarray
 
+_LARGEST = 1000.0  # of a shape coefficient, in standard deviations
+
 
 @dataclass(frozen=True)
 class Subject:
@@ -57,6 +59,8 @@ def subject_of(
     Raises:
         InputError: the file cannot be used, or has fewer coefficients or other vertices.
     """
+    if not (np.abs(shape) < _LARGEST).all():
+        raise InputError(f"shape coefficients are {float(np.abs(shape).max())} at most; a hand's are below ten")
     if request.mano is None:
         hand = load_hand(None, side)
         wrist = hand.joint_regressor[0] @ hand.template
