@@ -197,6 +197,7 @@ class _Run:
             tracking_error_cm=scores["tracking_error_cm"],
             rotation_error_deg=scores["object_rotation_error_deg"],
         )
+        self.evaluating += time.monotonic() - began
         self.points.append(point)
         self.last = params
         if _best(self.points) is point:
@@ -209,7 +210,6 @@ class _Run:
             f"tracking error {point.tracking_error_cm:.2f} cm",
             flush=True,
         )
-        self.evaluating += time.monotonic() - began
 
     def write_results(self) -> None:
         """Write those of the best and the last policy and the curve that are not there, or not as the state has them.
