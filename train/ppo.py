@@ -8,6 +8,7 @@ its last state when the same command is given again, and ends as it would have e
 import dataclasses
 import time
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import jax
@@ -18,12 +19,13 @@ from envs.evaluation.evaluate import evaluate
 from envs.evaluation.roll_out import make_roll_out
 from envs.parallel import ParallelEnv
 from envs.tracking import TrackingEnv
+from mjx_hand.files.npz_archive import replacing
 from mjx_hand.progress import counter
 from mjx_hand.pytree import pytree
 from train.experiment.setup import load_env, make_sets
 from train.learning.cadence import rollouts_per_demonstration, updates_between
 from train.learning.checkpoint import Checkpoint, is_saved, save_checkpoint
-from train.learning.curve import Point, points_of, write_curve
+from train.learning.curve import CURVE, Point, points_of
 from train.learning.interruption import interruptions
 from train.learning.learner import Learner, LearnerState, Networks
 from train.learning.policy import deterministic_policy
@@ -230,7 +232,7 @@ class _Run:
             )
             if not is_saved(checkpoint, self.folder.path / name):
                 save_checkpoint(checkpoint, self.folder.path / name)
-        write_curve(self.points, self.folder.path)
+        _write_curve(self.points, self.folder.path / CURVE)
 
     def _say_memory(self) -> None:
         if (needed := self.learner.memory()) is not None:
@@ -247,6 +249,15 @@ class _Run:
 def _best(points: Sequence[Point]) -> Point:
     """The first of the best evaluations."""
     return min(points, key=lambda point: (-point.success, point.tracking_error_cm))
+
+
+def _write_curve(points: Sequence[Point], path: Path) -> None:
+    names = [field.name for field in dataclasses.fields(Point)]
+    lines = [",".join(names), *(",".join(f"{value:g}" for value in dataclasses.astuple(p)) for p in points)]
+    text = "\n".join(lines) + "\n"
+    if not (path.is_file() and path.read_bytes() == text.encode()):
+        with replacing(path) as temporary:
+            temporary.write_text(text)
 
 
 def main(config: Config) -> Mapping[str, str]:

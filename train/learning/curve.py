@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from mjx_hand.errors import InputError
-from mjx_hand.files.npz_archive import replacing
 from train.settings.config import Config
 
 CURVE = "curve.csv"
@@ -43,17 +42,6 @@ def load_curve(folder: str | Path) -> list[Point]:
         raise InputError(
             f"{path}: not a learning curve; delete it and give the training's command again, which writes it anew"
         ) from None
-
-
-def write_curve(points: Sequence[Point], folder: str | Path) -> None:
-    """Write the evaluations of the training in a folder, if they are not there already."""
-    path = Path(folder) / CURVE
-    names = [field.name for field in dataclasses.fields(Point)]
-    lines = [",".join(names), *(",".join(f"{value:g}" for value in dataclasses.astuple(p)) for p in points)]
-    text = "\n".join(lines) + "\n"
-    if not (path.is_file() and path.read_bytes() == text.encode()):
-        with replacing(path) as temporary:
-            temporary.write_text(text)
 
 
 def points_of(notes: Mapping[str, Any]) -> list[Point]:
