@@ -101,7 +101,7 @@ def joint_motion() -> JointMotion:
 def _own(folder: Path) -> list[Valid]:
     joints = joint_motion()
     rotations = Rotation.random(FRAMES * 15, rng=RNG).as_matrix().reshape(FRAMES, 15, 3, 3)
-    wrist = {"wrist_position": joints.wrist_position, "wrist_quaternion": joints.wrist_quaternion}
+    wrist: dict[str, Any] = {"wrist_position": joints.wrist_position, "wrist_quaternion": joints.wrist_quaternion}
     motion = Motion(
         fps=30.0, rotations=rotations, **wrist, shape=RNG.normal(size=10), valid=np.ones(FRAMES, bool), source="valid"
     )
@@ -127,12 +127,13 @@ def _own(folder: Path) -> list[Valid]:
         joint_names=("a", "b"),
     )
     found = []
-    for name, save, value, reader in (
+    kinds: tuple[tuple[str, Any, Any, str], ...] = (
         ("motion NPZ", save_motion, motion, "motion"),
         ("angles NPZ", save_joint_motion, joints, "angles"),
         ("demonstration NPZ", save_demonstration, demonstration, "demonstration"),
         ("robot motion NPZ", save_robot_motion, robot, "robot motion"),
-    ):
+    )
+    for name, save, value, reader in kinds:
         path = _new(folder, name) / "a.npz"
         save(value, path)
         found.append(_single(name, path, reader, "info"))
@@ -187,11 +188,12 @@ def _keypoints(folder: Path) -> list[Valid]:
     ]
     path.write_text("\n".join(rows) + "\n")
     found.append(_single("keypoint CSV", path, "keypoints", "info", side="right"))
-    for name, arrays in (
+    kinds: tuple[tuple[str, dict[str, Any] | None], ...] = (
         ("own", None),
         ("arrays", {"joints": points, "fps": 30.0, "side": "right", "t": np.arange(FRAMES) / 30}),
         ("leap", _leap(points)),
-    ):
+    )
+    for name, arrays in kinds:
         path = _new(folder, f"keypoint npz {name}") / "a.npz"
         if arrays is None:
             save_keypoints(KeypointRecording(fps=30.0, positions=points, side="right"), path)
@@ -201,7 +203,7 @@ def _keypoints(folder: Path) -> list[Valid]:
     return found
 
 
-def _leap(points: np.ndarray) -> dict[str, np.ndarray]:
+def _leap(points: np.ndarray) -> dict[str, Any]:
     joints = 1000 * points[:, 1:].reshape(FRAMES, 5, 4, 3)
     return {"t": np.arange(FRAMES) / 110, "right_1_joints_mm": joints, "right_1_frame": np.arange(FRAMES)}
 
@@ -244,7 +246,7 @@ def _datasets(folder: Path) -> list[Valid]:
     return found
 
 
-def _dexmv() -> dict[str, np.ndarray]:
+def _dexmv() -> dict[str, Any]:
     """A hand at rest that moves as a whole."""
     hand = load_hand()
     transforms = np.tile(np.eye(4), (FRAMES, 16, 1, 1))
