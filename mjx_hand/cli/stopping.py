@@ -5,6 +5,7 @@ falls into a callback of a library's garbage collector is dropped there, so that
 """
 
 import _thread
+import signal
 import sys
 import threading
 from collections.abc import Sequence
@@ -31,13 +32,22 @@ def stop_quietly() -> None:
 
     def ignored(what: Any) -> None:
         if issubclass(what.exc_type, KeyboardInterrupt):
-            again = threading.Timer(_AGAIN, _thread.interrupt_main)
+            again = threading.Timer(_AGAIN, _interrupt)
             again.daemon = True
             again.start()
         else:
             usual_ignored(what)
 
     sys.excepthook, sys.unraisablehook = ended, ignored
+
+
+def _interrupt() -> None:
+    """Send the main thread a signal, which also ends a wait of the system's, as the terminal's own does."""
+    main = threading.main_thread().ident
+    if main is not None and hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(main, signal.SIGINT)
+    else:
+        _thread.interrupt_main()
 
 
 def is_program(words: Sequence[str]) -> bool:
