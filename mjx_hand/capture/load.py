@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from mjx_hand.capture.datasets.contents import WHOLE, read_contents
-from mjx_hand.capture.datasets.dataset_format import DatasetFormat, Request, dataset_formats
+from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request, dataset_formats
 from mjx_hand.capture.marker_files.load_markers import load_markers
 from mjx_hand.capture.marker_fit.fit import fit_markers
 from mjx_hand.capture.markers.gap_filling import FILL, fill_short_gaps
@@ -87,7 +87,7 @@ def _asked_for(path: Path, known: DatasetFormat, request: Request, motion: Motio
     return motion
 
 
-def _found(path: Path, contents: dict) -> str:
+def _found(path: Path, contents: Contents) -> str:
     if path.is_dir():
         return "a folder of no layout that is known here"
     if path.suffix.lower() in _MARKER_FILES:

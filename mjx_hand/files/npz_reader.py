@@ -69,7 +69,7 @@ class Archive(Mapping[str, Any]):
                 raise
             except Exception as error:
                 raise InputError(
-                    f"{self._path}: not a readable .npz file ({_short(name)}: {reason_of(error)}); copy it again"
+                    f"{self._path}: {_short(name)}: not a readable .npy array ({reason_of(error)}); copy it again"
                 ) from None
         return self._found[name]
 
