@@ -93,32 +93,6 @@ def scene_spec(
     return spec
 
 
-def scene_model(
-    rigid: RigidHand,
-    description: ObjectDescription,
-    support: Float[np.ndarray, "b 3"],
-    support_position: Float[np.ndarray, "b 3"],
-    base_rotation: Float[np.ndarray, "3 3"],
-    *,
-    gains: Gains | None = None,
-    visual: bool = False,
-    spare: int = 0,
-    assisted: bool = False,
-) -> mujoco.MjModel:
-    """Compile the scene; arguments as of `scene_spec`."""
-    return scene_spec(
-        rigid,
-        description,
-        support,
-        support_position,
-        base_rotation,
-        gains=gains,
-        visual=visual,
-        spare=spare,
-        assisted=assisted,
-    ).compile()
-
-
 def _object_geoms(spec: mujoco.MjSpec, body: mujoco.MjsBody, description: ObjectDescription) -> list[mujoco.MjsGeom]:
     """The object's geoms with their masses: one, or one a convex piece of a mesh."""
     if description.kind != "mesh":
@@ -171,8 +145,8 @@ def demonstration_model(
     spare: int = 0,
     assisted: bool = False,
 ) -> mujoco.MjModel:
-    """The scene that a demonstration takes place in; arguments as of `scene_model`."""
-    return scene_model(
+    """The scene that a demonstration takes place in; arguments as of `scene_spec`."""
+    return scene_spec(
         hand,
         demonstration.object,
         demonstration.support,
@@ -182,7 +156,7 @@ def demonstration_model(
         visual=visual,
         spare=spare,
         assisted=assisted,
-    )
+    ).compile()
 
 
 def demonstration_models(

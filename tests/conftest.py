@@ -11,6 +11,10 @@ from jaxtyping import install_import_hook
 if sys.platform == "linux":
     os.environ.setdefault("MUJOCO_GL", "egl")
 
+# Before JAX's first import, and for the processes that tests start: they spend more time compiling than running what is
+# compiled, so that it is not worth optimising.
+os.environ["XLA_FLAGS"] = " ".join(filter(None, (os.environ.get("XLA_FLAGS"), "--xla_backend_optimization_level=0")))
+
 # Before any of these packages is imported: every signature's shapes and types are then checked as the tests run.
 install_import_hook(["mjx_hand", "envs", "train", "tools"], "beartype.beartype")
 

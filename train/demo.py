@@ -16,6 +16,7 @@ import jax
 import numpy as np
 from matplotlib.figure import Figure
 
+from envs.demonstrations.dataset import make_missing_sets
 from envs.demonstrations.set_settings import set_folder
 from mjx_hand.cli.retarget import retarget
 from mjx_hand.errors import InputError
@@ -28,7 +29,7 @@ from mjx_hand.view.figures import plots
 from mjx_hand.view.report import Film, Headline, Plot, Report, Section, write_report
 from train.evaluate import show
 from train.experiment.evaluate_seeds import POLICY, REPLAY, ZERO, Results, evaluate_seeds, median_and_worst
-from train.experiment.setup import load_env, make_sets
+from train.experiment.setup import load_env
 from train.learning.curve import Point
 from train.ppo import train
 from train.reports.evaluation_page import TRACKING, tables, tracking_plot
@@ -52,7 +53,7 @@ def main(config: Config) -> None:
     timings: list[tuple[str, float]] = []
 
     with _stage("demonstrations: performed, recorded with markers, fitted, projected", timings):
-        make_sets(config)
+        make_missing_sets(config.data, config.demonstrations)
         env = load_env(config, "train")
     recording = set_folder(config.data, config.demonstrations) / "heldout" / "000.motion.npz"
     with _stage("retargeting a recording", timings):

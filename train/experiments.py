@@ -4,11 +4,12 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from envs.demonstrations.dataset import make_missing_sets
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 from train.evaluate import evaluate_and_write
 from train.experiment.evaluate_seeds import shared_folder
-from train.experiment.setup import load_env, make_sets
+from train.experiment.setup import load_env
 from train.learning.curve import is_finished, load_curve
 from train.ppo import train
 from train.reports.evaluation_record import cached_results
@@ -88,7 +89,7 @@ def measure(configs: Sequence[Config]) -> Experiment:
     folder = shared_folder(configs)
     summary = cached_results(configs) if finished and not configs[0].fresh else None
     if summary is None:
-        make_sets(configs[0])
+        make_missing_sets(configs[0].data, configs[0].demonstrations)
         env = load_env(configs[0], "train")
         for config in configs:
             train(config, env)

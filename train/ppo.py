@@ -15,14 +15,16 @@ import jax
 import numpy as np
 from tensorboardX import SummaryWriter
 
+from envs.demonstrations.dataset import make_missing_sets
 from envs.evaluation.evaluate import evaluate
 from envs.evaluation.roll_out import make_roll_out
 from envs.parallel import ParallelEnv
+from envs.physics.engine import available_engine
 from envs.tracking import TrackingEnv
 from mjx_hand.files.npz_archive import replacing
 from mjx_hand.progress import counter
 from mjx_hand.pytree import pytree
-from train.experiment.setup import load_env, make_sets
+from train.experiment.setup import load_env
 from train.learning.cadence import rollouts_per_demonstration, updates_between
 from train.learning.checkpoint import Checkpoint, is_saved, save_checkpoint
 from train.learning.curve import CURVE, Point, points_of
@@ -62,7 +64,8 @@ def train(config: Config, env: TrackingEnv | None = None, watch: Watch | None = 
 
 def _train(config: Config, env: TrackingEnv | None, folder: RunFolder, watch: Watch | None) -> list[Point]:
     if env is None:
-        make_sets(config)
+        available_engine(config.engine)  # before the minutes that sets take
+        make_missing_sets(config.data, config.demonstrations)
         env = load_env(config, "train")
     learner = Learner(ParallelEnv(env, guard=config.debug.nan_guard), config.ppo)
     run = _Run(config, env, learner, folder)

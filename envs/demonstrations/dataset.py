@@ -17,6 +17,7 @@ import numpy as np
 from envs.demonstrations.from_recording.demonstration import RECORDED, read_demonstration
 from envs.demonstrations.from_recording.variations import vary
 from envs.demonstrations.load_set import PARTS, demonstration_files
+from envs.demonstrations.scripted.own_object import own_object
 from envs.demonstrations.scripted.simulated_capture import project_recording, record_trials, save_truth
 from envs.demonstrations.scripted.trials import perform_trials
 from envs.demonstrations.set_settings import SetSettings, set_folder
@@ -95,9 +96,16 @@ def _make_part(
     rng = np.random.default_rng(seed)
     shapes = np.clip(rng.normal(size=(people, model.num_shape)), -_SHAPE_LIMIT, _SHAPE_LIMIT)
     hands = [build_rigid_hand(model, shape) for shape in shapes]
+    given = {"mass": settings.object_mass, "density": settings.object_density}
+    own = own_object(settings.object, grasp, **given) if settings.object else None
     wanted, what = people * settings.trials, f"{part} {grasp.name}"
     trials, tally = perform_trials(
-        grasp, hands, settings.trials, seed, lambda kept, tried: report(f"performing {what} grasps", kept / wanted)
+        grasp,
+        hands,
+        settings.trials,
+        seed,
+        lambda kept, tried: report(f"performing {what} grasps", kept / wanted),
+        own,
     )
     recorded = record_trials(
         trials,

@@ -12,6 +12,7 @@ from envs.demonstrations.scripted.simulated_capture import CaptureSettings
 from envs.grasps import grasp_names, grasp_type
 from mjx_hand.capture.datasets.dexmv_object import recording_files
 from mjx_hand.errors import InputError
+from mjx_hand.objects.mesh_file import mesh_digest
 
 ALL = "all"
 GIVEN = "given"
@@ -33,6 +34,8 @@ class SetSettings:
         capture: how they are recorded.
         recording: the real recording, and how it is varied; of the other settings it uses the seed.
         folder: of finished demonstrations, as `load_set.load_part` reads it.
+        object: a mesh file (m), which scripted grasps grasp in place of the type's objects; its axes are the type's.
+        object_mass, object_density: of it, kg or kg/m³; without either the type's range of masses is drawn from.
     """
 
     grasp: str
@@ -43,6 +46,9 @@ class SetSettings:
     capture: CaptureSettings = dataclasses.field(default_factory=CaptureSettings)
     recording: RecordingSettings = dataclasses.field(default_factory=RecordingSettings)
     folder: str = ""
+    object: str = ""
+    object_mass: float | None = None
+    object_density: float | None = None
 
     def __post_init__(self):
         if self.grasp not in (ALL, RECORDED, GIVEN):
@@ -57,6 +63,17 @@ class SetSettings:
                 f"data.grasp is {self.grasp!r} and data.recording.path {self.recording.path!r}; "
                 f"give both, data.grasp={RECORDED} and the recording's folder, or a grasp type and no recording"
             )
+        if self.object and self.grasp in (ALL, RECORDED, GIVEN):
+            raise InputError(
+                f"data.object is {self.object!r} and data.grasp {self.grasp!r}; an own object is grasped by one "
+                f"scripted type: {', '.join(grasp_names())}"
+            )
+        if not self.object and (self.object_mass, self.object_density) != (None, None):
+            raise InputError(
+                "data.object_mass and data.object_density are those of data.object=FILE, which is not given"
+            )
+        if self.object_mass is not None and self.object_density is not None:
+            raise InputError("both data.object_mass and data.object_density are given; give one of them")
         for name in ("people", "heldout_people", "trials"):
             if getattr(self, name) < 1:
                 raise InputError(f"data.{name} is {getattr(self, name)}; it must be at least 1")
@@ -99,6 +116,11 @@ def fingerprint(settings: SetSettings) -> dict[str, Any]:
     """All settings that tell sets apart, as in `CaptureSettings.fingerprint`."""
     told = dataclasses.asdict(settings) | {"capture": settings.capture.fingerprint()}
     del told["folder"]  # what it holds tells, not where it is: `load_set.part_digest`
+    if settings.object:
+        told["object"] = mesh_digest(settings.object)
+    else:  # sets from before there were own objects keep their names
+        for name in ("object", "object_mass", "object_density"):
+            del told[name]
     return told
 
 

@@ -122,5 +122,5 @@ class GraspType:
         if self.object_kind not in SCRIPTED_KINDS:
             raise InputError(
                 f"grasp type {self.name!r}: object_kind is {self.object_kind!r}, but scripted grasps draw objects by "
-                f"their size; valid: {', '.join(SCRIPTED_KINDS)} (a mesh can be in demonstrations given by data.folder)"
+                f"their size; valid: {', '.join(SCRIPTED_KINDS)} (a mesh takes their place by data.object=FILE)"
             )

@@ -2,19 +2,21 @@
 
 from pathlib import Path
 
-from mjx_hand.capture.datasets.contents import WHOLE, read_contents
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request, dataset_formats
 from mjx_hand.capture.marker_files.load_markers import load_markers
 from mjx_hand.capture.marker_fit.fit import fit_markers
 from mjx_hand.capture.markers.gap_filling import FILL, fill_short_gaps
 from mjx_hand.capture.markers.labels import match_labels
 from mjx_hand.capture.markers.marker_set import load_marker_set
+from mjx_hand.capture.unread import described_for_reading
 from mjx_hand.errors import InputError
+from mjx_hand.files.contents import read_contents
+from mjx_hand.files.input_file import check_input_file
 from mjx_hand.hand.load import load_hand
 from mjx_hand.hand.model import HandModel
 from mjx_hand.motion import Motion
+from mjx_hand.motion.plausibility.motions import plausible_motion
 
-_SHOWN = 6  # how many names of an unknown archive the message lists
 _MARKER_FILES = (".c3d", ".trc", ".tsv")
 
 
@@ -41,38 +43,36 @@ def load_motion(
 
     Raises:
         InputError: there is no such file, no format recognises it, its contents are not sound, or it is not what was
-            asked for.
+            asked for, or no hand moves so (`mjx_hand.motion.plausibility`).
     """
     path = Path(path)
     if side not in (None, "right", "left"):
         raise InputError(f"side is {side!r}; give 'right' or 'left'")
     if markers is not None:
-        if sequence is not None or fps is not None:
-            raise InputError(f"{path}: marker files hold one recording and its rate; leave out sequence= and fps=")
-        return _fitted(path, markers, load_hand(mano, side or "right"))
+        if sequence is not None:
+            raise InputError(f"{path}: marker files hold one recording; leave out sequence=")
+        return _fitted(path, markers, load_hand(mano, side or "right"), fps)
     request = Request(
         side=side,
         sequence=sequence,
         mano=Path(mano) if mano is not None else None,
         fps=float(fps) if fps is not None else None,
     )
-    if not path.exists():
-        raise InputError(f"{path}: no such file; give the path of a recording")
-    if path.is_file() and path.stat().st_size == 0:
-        raise InputError(f"{path}: the file is empty; give the path of a recording")
+    if not path.is_dir():
+        check_input_file(path, "give the path of a recording")
     contents = read_contents(path)
     formats = dataset_formats()
     for known in formats:
         if known.recognises(path, contents):
-            return _asked_for(path, known, request, known.read(path, contents, request))
-    names = ", ".join(known.name.split(" (")[0] for known in formats)
-    raise InputError(f"{path}: {_found(path, contents)}; formats read: {names} (docs/datasets.md says how)")
+            motion = _asked_for(path, known, request, known.read(path, contents, request))
+            return plausible_motion(motion, name=str(path))
+    raise InputError(f"{path}: not a recording that is known here, but {_found(path, contents)}")
 
 
-def _fitted(path: Path, markers: str | Path, hand: HandModel) -> Motion:
+def _fitted(path: Path, markers: str | Path, hand: HandModel, fps: float | None) -> Motion:
     """The motion of the hand that wears these markers."""
     marker_set = load_marker_set(markers, hand)
-    recording = match_labels(load_markers(path), marker_set).recording
+    recording = match_labels(load_markers(path, fps=fps), marker_set).recording
     return fit_markers(fill_short_gaps(recording, FILL), hand, marker_set)[0]
 
 
@@ -88,15 +88,8 @@ def _asked_for(path: Path, known: DatasetFormat, request: Request, motion: Motio
 
 
 def _found(path: Path, contents: Contents) -> str:
-    if path.is_dir():
-        return "a folder of no layout that is known here"
     if path.suffix.lower() in _MARKER_FILES:
         return "a marker recording: name its marker set, markers='hand22' or a YAML file, or run mjx-hand fit"
     if "schema" in contents:
-        return f"an .npz of schema {contents['schema']}, not a motion"
-    if WHOLE in contents:
-        return f"a lone {type(contents[WHOLE]).__name__} without names"
-    if contents:
-        names = [str(name) for name in contents]
-        return f"an {path.suffix} of {', '.join(names[:_SHOWN])}{' and more' if len(names) > _SHOWN else ''}"
-    return f"not a recording that is known here (suffix {path.suffix or 'none'})"
+        return f"an .npz of schema {str(contents['schema'])[:60]}, not a motion"
+    return described_for_reading(path, contents)

@@ -5,10 +5,6 @@ from pathlib import Path
 
 import numpy as np
 
-from mjx_hand.capture.keypoint_files.load_keypoints import chosen, keypoint_contents, recognised
-from mjx_hand.capture.keypoints.layouts import KEYPOINTS
-from mjx_hand.capture.keypoints.recording import KeypointRecording
-from mjx_hand.capture.keypoints.side import known_side
 from mjx_hand.capture.marker_files.load_markers import load_markers
 from mjx_hand.capture.markers.labels import label_starts, match_labels
 from mjx_hand.capture.markers.marker_recording import MarkerRecording
@@ -21,18 +17,20 @@ from mjx_hand.robots.robot_motion import RobotMotion
 
 Facts = tuple[tuple[str, str], ...]
 
-BIGGEST_HAND, BIGGEST_ROOM = 1.0, 30.0  # m; what is bigger is in another unit
+MOST_STARTS = 16  # of labels that are tried as a prefix: more are not people, but other words
+BIGGEST_ROOM = 30.0  # m; what is bigger is in another unit
 
 
 def motion(found: Motion) -> Facts:
     """Of a motion."""
     return (
         ("hand", f"{found.side}, {len(found.shape)} shape coefficients{_own_joints(found)}"),
-        _frames(found.num_frames, found.fps),
-        ("gaps", _share(~found.valid)),
+        frames(found.num_frames, found.fps),
+        ("gaps", share_missing(~found.valid)),
         ("units", "metres, radians, seconds; quaternions wxyz"),
         ("wrist", _travel(found.wrist_position[found.valid])),
         ("source", found.source or "not said"),
+        *_warnings(found.warnings),
     )
 
 
@@ -40,11 +38,12 @@ def joint_motion(found: JointMotion) -> Facts:
     """Of a joint motion."""
     return (
         ("hand", f"{found.side}, {found.angles.shape[1]} hinges"),
-        _frames(found.num_frames, found.fps),
-        ("gaps", f"{_share(~found.valid)}{', interpolated' if not found.valid.all() else ''}"),
+        frames(found.num_frames, found.fps),
+        ("gaps", f"{share_missing(~found.valid)}{', interpolated' if not found.valid.all() else ''}"),
         ("units", "radians, metres, seconds; quaternions wxyz"),
         ("wrist", _travel(found.wrist_position)),
         ("source", found.source or "not said"),
+        *_warnings(found.warnings),
     )
 
 
@@ -52,11 +51,12 @@ def robot_motion(found: RobotMotion) -> Facts:
     """Of a robot hand's motion."""
     return (
         ("robot", f"{found.robot or 'not said'}, {len(found.joint_names)} joints: {', '.join(found.joint_names)}"),
-        _frames(len(found.values), found.fps),
-        ("gaps", f"{_share(~found.valid)}{', interpolated' if not found.valid.all() else ''}"),
+        frames(len(found.values), found.fps),
+        ("gaps", f"{share_missing(~found.valid)}{', interpolated' if not found.valid.all() else ''}"),
         ("units", "radians, metres, seconds; quaternions wxyz"),
         ("base", _travel(found.base_position)),
         ("source", found.source or "not said"),
+        *_warnings(found.warnings),
     )
 
 
@@ -76,56 +76,9 @@ def demonstration(found: Demonstration) -> Facts:
     )
 
 
-def keypoints(path: Path, side: str | None, sequence: str | None, fps: float | None) -> tuple[str, Facts, str]:
-    """Of a keypoint file: its form, what is in it, and the options that choose the hand that is described."""
-    contents = keypoint_contents(path)
-    reader = recognised(path, contents)
-    assert reader is not None, "the caller has looked"
-    hands = reader.read(path, contents, None)
-    names = ("hands", ", ".join(f"{name} ({hand.num_frames} frames)" for name, hand in hands.items()))
-    try:
-        found = chosen(path, hands, side, sequence)
-    except InputError as error:
-        return reader.name, (names, ("to read one", str(error).removeprefix(f"{path}: "))), " --sequence NAME"
-    said = {"side": side, "sequence": sequence, "fps": fps}
-    choice = "".join(f" --{name} {value}" for name, value in said.items() if value is not None)
-    try:
-        which = " ".join(f"({text})" if k else text for k, text in enumerate(known_side(found, side)))
-    except InputError as error:
-        which, choice = str(error).removeprefix(f"{found.source}: "), f"{choice} --side right"
-    rate = found.fps or fps
-    if rate is None:
-        choice += " --fps 30"
-    frames = (
-        _frames(found.num_frames, rate)
-        if rate
-        else ("frames", f"{found.num_frames}, at a rate that the file does not say")
-    )
-    return reader.name, (names, ("side", which), frames, *_points(found)), choice
-
-
-def _points(found: KeypointRecording) -> Facts:
-    seen = np.asarray(np.isfinite(found.positions).all(axis=-1))
-    never = [KEYPOINTS[k] for k in np.flatnonzero(~seen.any(axis=0))]
-    lacks = f", never {', '.join(never)}" if never else ""
-    extent = np.nanmax(found.positions, axis=(0, 1)) - np.nanmin(found.positions, axis=(0, 1))
-    across = np.ptp(found.positions[np.asarray(seen.any(axis=1))], axis=1)
-    doubt = (
-        "; a hand of this size there is not, give --unit to `mjx-hand keypoints`"
-        if np.isfinite(across).any() and np.nanmedian(across.max(axis=-1)) > BIGGEST_HAND
-        else ""
-    )
-    return (
-        ("keypoints", f"{21 - len(never)} of 21, layout {found.layout}{lacks}"),
-        ("gaps", _share(~seen[:, seen.any(axis=0)])),
-        ("units", "metres, from the unit that the file says, if it says one"),
-        ("extent", f"{' x '.join(f'{e:.3g}' for e in extent)} m over all frames{doubt}"),
-    )
-
-
-def markers(path: Path, units: str | None = None) -> tuple[Facts, str]:
+def markers(path: Path, units: str | None = None, fps: float | None = None) -> tuple[Facts, str]:
     """Of a marker recording: what is in it, and the options of `mjx-hand fit` that suit it best."""
-    found = load_markers(path, units)
+    found = load_markers(path, units, fps)
     suits, options = _suitable_set(found)
     missing = 1 - found.visible.mean(axis=0)
     worst = np.argsort(-missing)[:3]
@@ -135,12 +88,13 @@ def markers(path: Path, units: str | None = None) -> tuple[Facts, str]:
     doubt = "; a room of this size there is not, give --units" if extent.max() > BIGGEST_ROOM else ""
     return (
         ("markers", f"{len(found.names)}: {', '.join(found.names)}"),
-        _frames(found.num_frames, found.fps),
-        ("gaps", _share(~found.visible) + (f" (most: {holes})" if holes else "")),
+        frames(found.num_frames, found.fps),
+        ("gaps", share_missing(~found.visible) + (f" (most: {holes})" if holes else "")),
         ("units", f"metres, from the file's {units if units else 'own unit'}"),
         ("extent", f"{' x '.join(f'{e:.3g}' for e in extent)} m over all frames{doubt}"),
         ("marker set", suits),
-    ), options + (f" --units {units}" if units else "")
+        *_warnings(found.warnings),
+    ), options + (f" --units {units}" if units else "") + (f" --fps {fps:g}" if fps else "")
 
 
 def _suitable_set(found: MarkerRecording) -> tuple[str, str]:
@@ -150,7 +104,7 @@ def _suitable_set(found: MarkerRecording) -> tuple[str, str]:
     for name in INCLUDED:
         marker_set = included_marker_set(hand, name)
         starts = label_starts(found.names, marker_set)
-        for start in ("", *starts):
+        for start in ("", *starts[:MOST_STARTS]):
             try:
                 share = len(match_labels(found, marker_set, start).recording.names) / len(marker_set.names)
             except InputError:  # none of its labels, or two hands
@@ -210,11 +164,17 @@ def robot(path: Path) -> tuple[str, Facts]:
     raise InputError(f"{path}: XML of {root.tag!r}, neither a URDF (robot) nor an MJCF (mujoco)")
 
 
-def _frames(count: int, fps: float) -> tuple[str, str]:
+def _warnings(warnings: tuple[str, ...]) -> Facts:
+    return tuple(("warning", warning) for warning in warnings)
+
+
+def frames(count: int, fps: float) -> tuple[str, str]:
+    """How many frames there are, and for how long."""
     return "frames", f"{count} at {fps:g}/s ({count / fps:.1f} s)"
 
 
-def _share(missing: np.ndarray) -> str:
+def share_missing(missing: np.ndarray) -> str:
+    """How much is missing, in per cent."""
     return f"{100 * missing.mean():.1f} %" if missing.any() else "none"
 
 

@@ -1,18 +1,26 @@
 """What is known of a file, for people: its kind, its facts, and the commands that take it further."""
 
 import math
+import shlex
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from mjx_hand.capture.datasets.contents import read_contents
 from mjx_hand.capture.datasets.dataset_format import dataset_formats
 from mjx_hand.capture.datasets.keypoints import FORMAT as KEYPOINTS
-from mjx_hand.capture.keypoint_files.load_keypoints import is_keypoint_file
+from mjx_hand.capture.keypoint_files.load_keypoints import keypoint_contents, recognised
 from mjx_hand.capture.load import load_motion
-from mjx_hand.capture.marker_files.marker_format import marker_formats
+from mjx_hand.capture.marker_files.load_markers import marker_format_of
 from mjx_hand.capture.markers.marker_recording import SCHEMA as MARKERS
+from mjx_hand.capture.unread import described_for_reading
 from mjx_hand.cli import facts_of
+from mjx_hand.cli.keypoint_facts import keypoint_facts
+from mjx_hand.cli.wording import as_options
+from mjx_hand.cli.yaml_facts import yaml_facts
 from mjx_hand.errors import InputError
+from mjx_hand.files.contents import read_contents
+from mjx_hand.files.input_file import check_input_file
 from mjx_hand.files.npz_archive import schema_of
 from mjx_hand.motion import load_demonstration, load_joint_motion
 from mjx_hand.motion.demonstration import SCHEMA as DEMONSTRATION
@@ -22,6 +30,7 @@ from mjx_hand.robots.robot_motion import load_robot_motion
 
 VIDEOS = (".mp4", ".mov", ".avi", ".webm", ".mkv")
 _MANO_KEYS = {"v_template", "J_regressor", "kintree_table"}
+_LOOKED_AT = 20  # files of a suffix, to tell whether recordings are in a folder
 
 
 @dataclass(frozen=True)
@@ -61,37 +70,36 @@ def file_facts(
     """
     if fps is not None and not 0 < fps < math.inf:
         raise InputError(f"fps is {fps}; give frames per second, a number above 0")
-    if not path.exists():
-        raise InputError(f"{path}: no such file; give the path of a recording, a hand or a robot description")
-    if path.is_file() and path.stat().st_size == 0:
-        raise InputError(f"{path}: the file is empty; copy or export it again")
+    if not path.is_dir():
+        check_input_file(path, "give the path of a recording, a hand or a robot description")
+    own = _own(path, units, fps) or _robot(path) or yaml_facts(path)
+    if own is not None:
+        return own if isinstance(own, FileFacts) else FileFacts(*own)
+    contents = read_contents(path)
     return (
-        _own(path, units)
-        or _robot(path)
-        or _keypoints(path, side, sequence, fps)
-        or _motion(path, side, sequence, mano, fps)
-        or _mano(path)
-        or _markers(path, units)
+        _keypoints(path, contents, side, sequence, fps)
+        or _motion(path, contents, side, sequence, mano, fps)
+        or _mano(path, contents)
+        or _markers(path, units, fps)
         or _video(path)
-        or _unknown(path)
+        or _folder(path)
+        or _unknown(path, contents)
     )
 
 
-def _own(path: Path, units: str | None) -> FileFacts | None:
+def _own(path: Path, units: str | None, fps: float | None) -> FileFacts | None:
     """Joint motions, of robots too, and demonstrations; motions, markers, keypoints are found among the recordings."""
     schema = schema_of(path)
-    out = path.with_suffix("")
+    view = (f"mjx-hand view {_quoted(path)}",)
     if schema == JOINT_MOTION:
-        facts = facts_of.joint_motion(load_joint_motion(path))
-        return FileFacts(f"joint motion ({schema})", facts, (f"mjx-hand view {path}",))
+        return FileFacts(f"joint motion ({schema})", facts_of.joint_motion(load_joint_motion(path)), view)
     if schema == DEMONSTRATION:
-        facts = facts_of.demonstration(load_demonstration(path))
-        return FileFacts(f"demonstration ({schema})", facts, (f"mjx-hand view {path}",))
+        return FileFacts(f"demonstration ({schema})", facts_of.demonstration(load_demonstration(path)), view)
     if schema == ROBOT_MOTION:
         load = f"in Python: mjx_hand.robots.robot_motion.load_robot_motion({str(path)!r})"
         return FileFacts(f"robot motion ({schema})", facts_of.robot_motion(load_robot_motion(path)), (load,))
     if schema == MARKERS:
-        return _marker_facts(path, f"markers ({schema})", out, units)
+        return _marker_facts(path, f"markers ({schema})", units, fps)
     return None
 
 
@@ -99,66 +107,121 @@ def _robot(path: Path) -> FileFacts | None:
     if path.suffix.lower() not in (".urdf", ".xml"):
         return None
     kind, facts = facts_of.robot(path)
-    load = "yourdfpy.URDF.load" if kind.startswith("URDF") else "mujoco.MjModel.from_xml_path"
-    return FileFacts(kind, facts, (f"in Python: {load}({str(path)!r})",))
+    robot = f"mjx-hand robot RECORDING --urdf {_quoted(path)} --robot DESCRIPTION.yaml --out robot.npz"
+    return FileFacts(kind, facts, (robot,) if kind.startswith("URDF") else ())
 
 
-def _keypoints(path: Path, side: str | None, sequence: str | None, fps: float | None) -> FileFacts | None:
-    if not path.is_file() or not is_keypoint_file(path):
+def _keypoints(
+    path: Path, contents: Mapping[str, Any], side: str | None, sequence: str | None, fps: float | None
+) -> FileFacts | None:
+    if not path.is_file():
         return None
-    form, facts, choice = facts_of.keypoints(path, side, sequence, fps)
-    out = path.with_suffix("").name
-    commands = (f"mjx-hand view {path}{choice}", f"mjx-hand keypoints {path} --out {out}.motion.npz{choice}")
-    return FileFacts(form, facts, commands)
+    found = keypoint_contents(path, contents)
+    reader = recognised(path, found)
+    if reader is None:
+        return None
+    facts, commands = keypoint_facts(path, reader, found, side, sequence, fps)
+    return FileFacts(reader.name, facts, commands)
 
 
 def _motion(
-    path: Path, side: str | None, sequence: str | None, mano: Path | None, fps: float | None
+    path: Path,
+    contents: Mapping[str, Any],
+    side: str | None,
+    sequence: str | None,
+    mano: Path | None,
+    fps: float | None,
 ) -> FileFacts | None:
-    contents = read_contents(path)
     known = next((f for f in dataset_formats() if f is not KEYPOINTS and f.recognises(path, contents)), None)
     if known is None:
         return None
     said = {"side": side, "sequence": sequence, "mano": mano, "fps": fps}
-    choice = "".join(f" --{name} {value}" for name, value in said.items() if value is not None)
+    choice = "".join(f" --{name} {_quoted(value)}" for name, value in said.items() if value is not None)
     try:
         motion = load_motion(path, side=side, sequence=sequence, mano=mano, fps=fps)
     except InputError as error:
         # Of a known format, but it takes a choice to read it, or it is not sound: its own line says which.
-        return FileFacts(known.name, (("to read it", str(error).removeprefix(f"{path}: ")),), sound=False)
-    commands = (f"mjx-hand view {path}{choice}", f"mjx-hand retarget {path} --out angles.npz{choice}")
+        reason = as_options(str(error).removeprefix(f"{path}: "))
+        return FileFacts(known.name, (("to read it", reason),), sound=False)
+    file = _quoted(path)
+    commands = (f"mjx-hand view {file}{choice}", f"mjx-hand retarget {file} --out angles.npz{choice}")
     return FileFacts(known.name, facts_of.motion(motion), commands)
 
 
-def _mano(path: Path) -> FileFacts | None:
-    values = read_contents(path)
-    if not set(values) >= _MANO_KEYS:
+def _mano(path: Path, contents: Mapping[str, Any]) -> FileFacts | None:
+    if not set(contents) >= _MANO_KEYS:
         return None
     side, facts = facts_of.mano(path)
-    return FileFacts("MANO hand", facts, (f"mjx-hand build --out my_hand --side {side} --mano {path}",))
+    return FileFacts("MANO hand", facts, (f"mjx-hand build --out my_hand --side {side} --mano {_quoted(path)}",))
 
 
-def _markers(path: Path, units: str | None) -> FileFacts | None:
-    known = next((f for f in marker_formats() if path.suffix.lower() in f.suffixes and path.suffix != ".npz"), None)
-    return None if known is None or not path.is_file() else _marker_facts(path, known.name, path.with_suffix(""), units)
+def _markers(path: Path, units: str | None, fps: float | None) -> FileFacts | None:
+    if not path.is_file() or path.suffix.lower() == ".npz":
+        return None
+    known = marker_format_of(path)
+    if known is None:
+        return None
+    try:
+        return _marker_facts(path, known.name, units, fps)
+    except InputError as error:
+        if path.suffix.lower() != ".csv":
+            raise
+        # A table may be anybody's: what it holds says more than what it lacks as one of markers.
+        reason = str(error).removeprefix(f"{path}: ")
+        raise InputError(f"{path}: {described_for_reading(path, {})}; as markers: {reason}"[:600]) from None
 
 
-def _marker_facts(path: Path, kind: str, out: Path, units: str | None) -> FileFacts:
-    facts, options = facts_of.markers(path, units)
-    return FileFacts(kind, facts, (f"mjx-hand fit {path} {options} --out {out.name}.motion.npz",))
+def _marker_facts(path: Path, kind: str, units: str | None, fps: float | None) -> FileFacts:
+    facts, options = facts_of.markers(path, units, fps)
+    out = _quoted(f"{path.with_suffix('').name}.motion.npz")
+    return FileFacts(kind, facts, (f"mjx-hand fit {_quoted(path)} {options} --out {out}",))
 
 
 def _video(path: Path) -> FileFacts | None:
     if path.suffix.lower() not in VIDEOS:
         return None
     fact = ("to read it", "MediaPipe, the extra 'video', finds the hand's keypoints")
-    return FileFacts("video", (fact,), (f"mjx-hand track {path} --out {path.stem}.keypoints.npz",))
+    out = _quoted(f"{path.stem}.keypoints.npz")
+    return FileFacts("video", (fact,), (f"mjx-hand track {_quoted(path)} --out {out}",))
 
 
-def _unknown(path: Path) -> FileFacts:
+def _folder(path: Path) -> FileFacts | None:
+    """A folder of recordings, as `mjx-hand retarget` takes it: those of one suffix at a time."""
+    if not path.is_dir():
+        return None
+    files = [file for file in sorted(path.rglob("*")) if file.is_file() and not file.name.startswith(".")]
+    of_suffix: dict[str, list[Path]] = {}
+    for file in files:
+        of_suffix.setdefault(file.suffix, []).append(file)
+    some = {suffix: sum(map(_is_recording, own[:_LOOKED_AT])) for suffix, own in of_suffix.items()}
+    if not any(some.values()):
+        return None
+    suffix = max(some, key=lambda each: (each == ".npz" and some[each] > 0, some[each]))
+    looked = min(_LOOKED_AT, len(of_suffix[suffix]))
+    facts = (
+        ("files", f"{len(files)}, of them {len(of_suffix[suffix])} {suffix or 'without a suffix'}"),
+        ("recordings", f"{some[suffix]} of the first {looked} {suffix}"),
+    )
+    pattern = "" if suffix == ".npz" else f" --pattern {_quoted(f'*{suffix}')}"
+    return FileFacts("folder of recordings", facts, (f"mjx-hand retarget {_quoted(path)} --out angles{pattern}",))
+
+
+def _is_recording(file: Path) -> bool:
+    try:
+        contents = read_contents(file)
+        return any(known.recognises(file, contents) for known in dataset_formats())
+    except InputError:
+        return False
+
+
+def _unknown(path: Path, contents: Mapping[str, Any]) -> FileFacts:
     if schema := schema_of(path):
-        raise InputError(f"{path}: schema {schema}, which this version of mjx-hand does not read; make it again")
-    names = [f.name for f in (*dataset_formats(), *marker_formats())]
-    names += ["joint motion", "robot motion", "demonstration", "MANO", "URDF", "MJCF"]
-    short = dict.fromkeys(name.split(" (")[0] for name in names)
-    raise InputError(f"{path}: nothing that is known here; known are {', '.join(short)}")
+        raise InputError(f"{path}: schema {schema[:60]}, which this version of mjx-hand does not read; make it again")
+    raise InputError(
+        f"{path}: nothing that is known here, but {described_for_reading(path, contents)}; "
+        "docs/datasets.md lists what else is read"
+    )
+
+
+def _quoted(value: object) -> str:
+    return shlex.quote(str(value))

@@ -14,14 +14,14 @@ from mjx_hand.capture.markers.gap_filling import FILL, fill_short_gaps
 from mjx_hand.capture.markers.labels import Labelled, match_labels
 from mjx_hand.capture.markers.marker_recording import MarkerRecording, hide_marker
 from mjx_hand.capture.markers.marker_set import MarkerSet, load_marker_set
-from mjx_hand.cli.output import check_out, print_table
+from mjx_hand.cli.output import check_out, print_table, print_warnings
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import HINGES
 from mjx_hand.hand.load import load_hand
-from mjx_hand.hand.model import HandModel
-from mjx_hand.motion import Motion, load_motion_file, save_motion
+from mjx_hand.motion import JointMotion, Motion, load_motion_file, save_motion
 from mjx_hand.progress import counter
-from mjx_hand.retarget.sequence import retarget_sequence, rigid_hand_of
+from mjx_hand.pytree import replace
+from mjx_hand.retarget.sequence import plausible_angles, retarget_sequence, rigid_hand_of
 from mjx_hand.rigid.limits import anatomical_limits
 from mjx_hand.view.figures.fit_figure import fit_figure, fit_snapshots
 from mjx_hand.view.figures.plots import check_figure_path, save_figure
@@ -39,6 +39,7 @@ def fit(
     leave_out: str | None = None,
     prefix: str = "",
     units: str | None = None,
+    fps: float | None = None,
     fill: float = FILL,
     mano: Path | None = None,
 ) -> None:
@@ -54,6 +55,7 @@ def fit(
         leave_out: hide this marker from the fit, and say how far it is from where the fit expects it.
         prefix: use only labels that start with this, such as R_, and match what follows.
         units: m, cm, mm or in, where the file's own unit is wrong or missing.
+        fps: frames per second, where the file does not say.
         fill: fill gaps of up to so many seconds; longer ones are left to the hand's other markers.
         mano: a licensed MANO file; without it, the open hand.
     """
@@ -62,7 +64,7 @@ def fit(
         check_figure_path(plot)
     hand = load_hand(mano, side)
     marker_set = load_marker_set(markers, hand)
-    labelled = match_labels(load_markers(recording, units), marker_set, prefix)
+    labelled = match_labels(load_markers(recording, units, fps), marker_set, prefix)
     given = fill_short_gaps(labelled.recording, fill)
     filled = int((given.visible & ~labelled.recording.visible).sum())
     if leave_out is not None:
@@ -77,6 +79,9 @@ def fit(
 
         motion, report = fit_many([given], hand, marker_set, FitSettings(shape=known_shape(shape)), progress)[0]
     predicted = predicted_markers(hand, motion, marker_set, report.offsets)
+    rigid = rigid_hand_of(motion, hand)
+    joints = retarget_sequence(motion, rigid)
+    motion = replace(motion, warnings=plausible_angles(joints, rigid).warnings)
     if plot is not None:
         frames = fit_snapshots(motion, report)
         observed = in_set_order(given, marker_set)
@@ -84,7 +89,8 @@ def fit(
     save_motion(motion, out)
 
     _report(labelled, motion, report, filled)
-    print(impossible_angles(motion, hand))
+    print(impossible_angles(joints))
+    print_warnings(motion.warnings)
     if leave_out is not None:
         print(held_out(labelled.recording, motion, marker_set, predicted, leave_out))
     if plot is not None:
@@ -115,9 +121,9 @@ def in_set_order(recording: MarkerRecording, marker_set: MarkerSet) -> np.ndarra
     return positions
 
 
-def impossible_angles(motion: Motion, hand: HandModel) -> str:
+def impossible_angles(joints: JointMotion) -> str:
     """A line on frames whose joint angles, as the hinges have them, are outside the joints' ranges."""
-    angles = retarget_sequence(motion, rigid_hand_of(motion, hand)).angles[motion.valid]
+    angles = joints.angles[joints.valid]
     lower, upper = anatomical_limits()
     beyond = np.degrees(np.maximum(np.maximum(angles - upper, lower - angles), 0.0))
     frames = int((beyond > IMPOSSIBLE).any(axis=1).sum())

@@ -11,7 +11,7 @@ from mjx_hand.capture.keypoint_fit.fit import KeypointSettings, fit_keypoints
 from mjx_hand.capture.keypoint_fit.report import KeypointReport
 from mjx_hand.capture.keypoints.layouts import DIGITS
 from mjx_hand.capture.keypoints.side import known_side
-from mjx_hand.cli.output import check_out, print_table
+from mjx_hand.cli.output import check_out, print_table, print_warnings
 from mjx_hand.hand.joints import FINGERS
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion import Motion, save_motion
@@ -31,7 +31,7 @@ def keypoints(
     """Make a motion of hand keypoints: bone lengths give the shape, bone directions the rotations.
 
     Args:
-        recording: keypoints of MediaPipe, Leap, WebXR, OpenXR, ARKit or Quest: .json, .npz or .csv.
+        recording: keypoints of MediaPipe, Leap, WebXR, OpenXR, ARKit, MRTK or Quest: .json, .csv, .npz and their like.
         out: the .npz to write: the motion, which `mjx-hand retarget` reads.
         side: which hand, where the file holds both or does not say.
         sequence: the name of one hand in the file, where there are several.
@@ -52,6 +52,7 @@ def keypoints(
         f"{found.source}: layout {found.layout}, a {which} hand ({how}), {motion.num_frames} frames at {motion.fps:g}/s"
     )
     _report(motion, report, gaps)
+    print_warnings(motion.warnings)
     print(f"{out}  turn it into joint angles with: mjx-hand retarget {out} --out angles.npz")
 
 
@@ -65,9 +66,13 @@ def _report(motion: Motion, report: KeypointReport, gaps: int) -> None:
         rows.append((digit, f"{joints[:3].mean():.1f}", f"{joints[3]:.1f}", direction, bones))
     columns = ("finger", "joints (mm)", "tip (mm)", "bone direction (degrees)", "bones longer by (mm)")
     print_table(f"mean distance of the fitted hand from the keypoints; {gaps} frames in gaps", columns, rows)
-    print(
+    varies = (
         f"bone lengths vary over time by {100 * report.spread_seen:.1f} % as recorded, "
-        f"{100 * report.spread_fitted:.1f} % as fitted; jitter (second difference) {1e3 * report.jitter_seen:.2f} mm "
-        f"as recorded, {1e3 * report.jitter_fitted:.2f} mm as fitted"
+        f"{100 * report.spread_fitted:.1f} % as fitted"
     )
+    jitter = (
+        f"jitter (second difference) {1e3 * report.jitter_seen:.2f} mm as recorded, "
+        f"{1e3 * report.jitter_fitted:.2f} mm as fitted"
+    )
+    print(f"{varies}; {jitter if np.isfinite(report.jitter_seen) else 'no three frames in a row, which jitter takes'}")
     print(f"shape {np.array2string(motion.shape, precision=2, suppress_small=True, max_line_width=110)}")

@@ -11,6 +11,7 @@ import tyro
 
 from mjx_hand.cli.plugin_commands import plugin_commands, run_plugin, summary
 from mjx_hand.cli.usage import later, parsed
+from mjx_hand.cli.wording import as_options
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 
@@ -57,7 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             parse = functools.partial(tyro.extras.subcommand_cli_from_dict, functions, prog="mjx-hand", args=argv)
         status = parsed(parse)()
     except InputError as error:
-        print(f"mjx-hand: {error}", file=sys.stderr)
+        print(f"mjx-hand: {as_options(str(error))}", file=sys.stderr)
         return 2
     except BrokenPipeError:  # whoever read the output has seen enough, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # Python flushes once more as it ends

@@ -21,6 +21,12 @@ def print_table(title: str, columns: tuple[str, ...], rows: list[tuple[str, ...]
     Console().print(table)
 
 
+def print_warnings(warnings: tuple[str, ...]) -> None:
+    """What is doubtful about a result, a line each; it stands in the file too."""
+    for warning in warnings:
+        print(f"warning: {warning}")
+
+
 def spread(values: np.ndarray, scale: float) -> tuple[str, str, str]:
     """Mean, 95th percentile and maximum, times `scale`, to two decimals."""
     figures = (values.mean(), np.percentile(values, 95), values.max())

@@ -11,7 +11,8 @@ import tyro
 
 from mjx_hand.capture.datasets.dataset_format import dataset_formats
 from mjx_hand.capture.load import load_motion
-from mjx_hand.cli.output import check_out, print_table, spread
+from mjx_hand.cli.output import check_out, print_table, print_warnings, spread
+from mjx_hand.cli.wording import as_options
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import LINKS, ONE_DOF, TWO_DOF
 from mjx_hand.motion import Motion, save_joint_motion
@@ -19,7 +20,7 @@ from mjx_hand.progress import counter
 from mjx_hand.retarget.dataset import SUMMARY, retarget_dataset
 from mjx_hand.retarget.hands import KinematicHands
 from mjx_hand.retarget.options import RetargetOptions
-from mjx_hand.retarget.sequence import RetargetErrors, retarget_errors, retarget_many
+from mjx_hand.retarget.sequence import RetargetErrors, plausible_angles, retarget_errors, retarget_many
 from mjx_hand.retarget.summary import DONE, OUTER_JOINTS, Outcome
 from mjx_hand.view.figures.plots import check_figure_path, joint_errors, save_figure
 
@@ -82,10 +83,12 @@ def retarget(
     (joint_motion,) = retarget_many([motion], [rigid], options)  # the first call also compiled: time one that did not
     took = time.perf_counter() - first
     errors = retarget_errors(motion, joint_motion, rigid)
+    joint_motion = plausible_angles(joint_motion, rigid)
     if plot is not None:
         save_figure(joint_errors(LINKS[1:], {_told(options): np.degrees(errors.rotation[errors.valid])}), plot)
     save_joint_motion(joint_motion, out)
     _report(motion, errors, axes)
+    print_warnings(joint_motion.warnings)
     ready = first - began - took
     compiled = f"; compiling, or loading what was compiled, took {ready:.1f} s" if ready >= 0.1 else ""
     print(f"{motion.num_frames} frames in {1e3 * took:.0f} ms ({_told(options)}){compiled}")
@@ -166,8 +169,13 @@ def _folder(
     failed = [outcome for outcome in outcomes if outcome.status != DONE]
     if done:
         _folder_report(folder, done, time.perf_counter() - started, axes)
+    doubtful = [outcome for outcome in done if outcome.warnings]
+    for outcome in doubtful[:_SHOWN]:
+        print(f"warning: {outcome.file}: {outcome.warnings}")
+    if len(doubtful) > _SHOWN:
+        print(f"warnings on {len(doubtful) - _SHOWN} more recordings stand in {SUMMARY}")
     for outcome in failed[:_SHOWN]:
-        print(f"failed: {outcome.message}")
+        print(f"failed: {as_options(outcome.message)}")
     if failed:
         more = f", {len(failed) - _SHOWN} of them not shown here" if len(failed) > _SHOWN else ""
         print(f"{len(failed)} of {len(outcomes)} recordings could not be used{more}; exit status 1")

@@ -7,10 +7,11 @@ import numpy as np
 import tyro
 
 from mjx_hand.capture.keypoint_files.load_keypoints import is_keypoint_file, load_keypoints
+from mjx_hand.capture.keypoints.plausible import plausible_keypoints
 from mjx_hand.capture.keypoints.recording import KeypointRecording
 from mjx_hand.capture.keypoints.side import known_side
 from mjx_hand.capture.load import load_motion
-from mjx_hand.cli.output import check_out, print_table, spread
+from mjx_hand.cli.output import check_out, print_table, print_warnings, spread
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
 from mjx_hand.retarget.sequence import rigid_hand_of
@@ -50,6 +51,7 @@ def robot(
     description = load_robot(robot)
     tree, wanted = robot_objective(description, urdf, objective)
     found, which = _recorded(recording, side, sequence, fps)
+    found = plausible_keypoints(found, load_hand(side=which))
     if found.fps is None:
         raise InputError(f"{recording}: does not say its frame rate; give --fps")
     keypoints = found.positions
@@ -65,12 +67,14 @@ def robot(
         joint_names=tree.joint_names,
         robot=description.name,
         source=found.source,
+        warnings=found.warnings,
     )
     save_robot_motion(motion, out)
     gaps = len(motion.valid) - int(motion.valid.sum())
     print(
         f"{found.source or recording}: a {which} hand, {len(motion.valid)} frames at {motion.fps:g}/s, {gaps} in gaps"
     )
+    print_warnings(motion.warnings)
     _report(tree, wanted, vector_errors(keypoints, followed, tree, wanted)[followed.valid])
     print(f"{out}  load it with mjx_hand.robots.robot_motion.load_robot_motion({str(out)!r})")
 

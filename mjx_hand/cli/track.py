@@ -6,10 +6,12 @@ from typing import Annotated, Literal
 import numpy as np
 import tyro
 
+from mjx_hand.capture.keypoints.plausible import plausible_keypoints
 from mjx_hand.capture.keypoints.recording import save_keypoints
 from mjx_hand.capture.keypoints.video import track_video
-from mjx_hand.cli.output import check_out
+from mjx_hand.cli.output import check_out, print_warnings
 from mjx_hand.errors import InputError
+from mjx_hand.hand.load import load_hand
 from mjx_hand.progress import counter
 
 FEW = 0.1  # share of the frames below which a hand is taken for a mistake of the tracker
@@ -36,6 +38,8 @@ def track(
     which = side or often[0]
     if which not in hands:
         raise InputError(f"{video}: shows no {which} hand; it shows {', '.join(hands)}")
-    save_keypoints(hands[which], out)
+    found = plausible_keypoints(hands[which], load_hand(side=which))
+    save_keypoints(found, out)
     print(f"{out}: {hands[which].num_frames} frames at {hands[which].fps:g}/s, hand seen in {100 * seen[which]:.0f} %")
+    print_warnings(found.warnings)
     print(f"make a motion of it with: mjx-hand keypoints {out} --out motion.npz --cutoff 6")

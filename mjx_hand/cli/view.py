@@ -53,7 +53,7 @@ def view(
         port: to serve at; 0 chooses a free one.
         host: address to listen on; 0.0.0.0 lets other computers look too.
     """
-    seen = load_markers(markers, units) if markers is not None else None
+    seen = load_markers(markers, units, fps) if markers is not None else None
     scene = recording_scene(recording, side, sequence, fps, up, mano)
     if seen is not None:
         scene = with_markers(scene, seen)

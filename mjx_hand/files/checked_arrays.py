@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -9,6 +10,9 @@ from mjx_hand.errors import InputError
 from mjx_hand.files.npz_reader import Arrays
 
 Dimension = int | str
+# Lines of text. Not tuple[str, ...]: type checkers at run time look at an item of it that they draw by chance, which
+# whoever builds random data from a seed (Hypothesis) must not have.
+Lines = tuple[Any, ...]
 
 
 def numbers(
@@ -63,12 +67,14 @@ def text(path: str | Path, arrays: Arrays, name: str) -> str:
     return _strings(path, arrays, name, 0).item()
 
 
-def texts(path: str | Path, arrays: Arrays, name: str) -> tuple[str, ...]:
-    """The list of strings of that name.
+def texts(path: str | Path, arrays: Arrays, name: str, *, needed: bool = True) -> Lines:
+    """The list of strings of that name; none where it is missing and not `needed`.
 
     Raises:
         InputError: it is missing, or is not a list of strings.
     """
+    if not needed and name not in arrays:
+        return ()
     return tuple(_strings(path, arrays, name, 1).tolist())
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from mjx_hand.errors import InputError, reason_of
+from mjx_hand.files.input_file import refuse_pointer
 from mjx_hand.files.npz_reader import Archive
 
 _MAGIC = b"\x93NUMPY"
@@ -108,6 +109,7 @@ def open_archive(path: str | Path) -> Archive:
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: no such file; give the path of an .npz file")
+    refuse_pointer(path)
     if not zipfile.is_zipfile(path):
         lone = "a single array, not an .npz archive of named arrays" if _is_array(path) else "not a readable .npz file"
         raise InputError(f"{path}: {lone}; give an .npz file, or copy it again")

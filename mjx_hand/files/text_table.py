@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from mjx_hand.errors import InputError
+from mjx_hand.files.input_file import refuse_pointer
 
 _MISSING = {"", "nan", "NaN", "NAN", "null", "NULL", "-", "-nan", "-nan(ind)"}
 
@@ -17,6 +18,7 @@ def read_lines(path: Path) -> list[str]:
     Raises:
         InputError: the file is binary, or cannot be read.
     """
+    refuse_pointer(path)
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -30,7 +32,14 @@ def read_lines(path: Path) -> list[str]:
 
 
 def numbers_of(
-    path: Path, lines: Sequence[str], separator: str, columns: int, first: int, *, trimmed: bool = False
+    path: Path,
+    lines: Sequence[str],
+    separator: str,
+    columns: int,
+    first: int,
+    *,
+    trimmed: bool = False,
+    wider: bool = False,
 ) -> Float[np.ndarray, "t n"]:
     """One row a line, empty cells and the word nan as NaN.
 
@@ -41,6 +50,7 @@ def numbers_of(
         columns: how many every row has. One empty cell more, from a separator at the line's end, is allowed.
         first: number of the first line in the file, from 1.
         trimmed: rows may lack empty cells at their end.
+        wider: rows may have more cells, which are passed over.
 
     Raises:
         InputError: a row of another length, or a cell that is not a number.
@@ -50,7 +60,7 @@ def numbers_of(
         if not line.strip():
             continue
         cells = [cell.strip() for cell in line.split(separator)]
-        while len(cells) > columns and not cells[-1]:
+        while len(cells) > columns and (wider or not cells[-1]):
             cells.pop()
         if trimmed:
             cells += [""] * (columns - len(cells))

@@ -13,6 +13,7 @@ from jaxtyping import Float, Int
 
 from mjx_hand.errors import InputError, reason_of
 from mjx_hand.files import safe_pickle
+from mjx_hand.files.input_file import refuse_pointer
 from mjx_hand.files.npz_archive import open_archive
 from mjx_hand.hand.joints import NUM_LINKS, PARENTS, TIP_LINKS
 from mjx_hand.hand.model import HandModel
@@ -93,6 +94,7 @@ def _values(path: Path) -> Mapping[str, Any]:
     if not path.is_file():
         what = "a folder" if path.is_dir() else "no such file"
         raise InputError(f"{path}: {what}; give a MANO .pkl or .npz, or leave it out to use the open hand")
+    refuse_pointer(path)
     if zipfile.is_zipfile(path):
         return open_archive(path)
     return safe_pickle.read(path.read_bytes(), str(path))

@@ -87,6 +87,7 @@ def save_demonstration(demonstration: Demonstration, path: str | Path) -> None:
             "grasp": d.grasp,
             "source": d.source,
             **hinges,
+            **({"warnings": np.array(m.warnings)} if m.warnings else {}),
         },
     )
 

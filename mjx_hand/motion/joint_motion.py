@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from mjx_hand.errors import InputError
-from mjx_hand.files.checked_arrays import numbers, text, texts
+from mjx_hand.files.checked_arrays import Lines, numbers, text, texts
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 from mjx_hand.files.npz_reader import Arrays
 from mjx_hand.hand.joints import HINGES, NUM_HINGES
@@ -34,6 +34,7 @@ class JointMotion:
         valid: False where the recording has a gap; the angles there are interpolated.
         side: "right" or "left".
         source: provenance, one line.
+        warnings: what is doubtful about it, one line each.
     """
 
     fps: float
@@ -43,6 +44,7 @@ class JointMotion:
     valid: Bool[np.ndarray, "t"]
     side: str = static(default="right")
     source: str = static(default="")
+    warnings: Lines = static(default=())
 
     @property
     def num_frames(self) -> int:
@@ -52,10 +54,12 @@ class JointMotion:
 
 def save_joint_motion(motion: JointMotion, path: str | Path) -> None:
     """Write as `.npz` (schema mjx-hand/joint-motion/1); `joint_names` records the hinge order."""
+    warnings = {"warnings": np.array(motion.warnings)} if motion.warnings else {}
     save_arrays(
         path,
         SCHEMA,
         {
+            **warnings,
             "fps": motion.fps,
             "angles": motion.angles,
             "wrist_position": motion.wrist_position,
@@ -101,4 +105,5 @@ def joint_motion_of(path: str | Path, arrays: Arrays, source: str) -> JointMotio
         valid=n["valid"].astype(bool),
         side=side,
         source=source,
+        warnings=texts(path, arrays, "warnings", needed=False),
     )

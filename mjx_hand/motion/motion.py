@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from mjx_hand.errors import InputError
-from mjx_hand.files.checked_arrays import numbers, text
+from mjx_hand.files.checked_arrays import Lines, numbers, text, texts
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 from mjx_hand.hand.joints import FINGERS, NUM_BALL_JOINTS, NUM_LINKS
 from mjx_hand.pytree import pytree, static
@@ -40,6 +40,7 @@ class Motion:
         valid: whether the frame was recorded (False in gaps).
         side: "right" or "left".
         source: provenance, one line.
+        warnings: what is doubtful about it, one line each.
     """
 
     fps: float
@@ -52,6 +53,7 @@ class Motion:
     tip_offset: Float[np.ndarray, "5 3"] | None = None
     side: str = static(default="right")
     source: str = static(default="")
+    warnings: Lines = static(default=())
 
     @property
     def num_frames(self) -> int:
@@ -128,6 +130,8 @@ def save_motion(motion: Motion, path: str | Path) -> None:
         "side": motion.side,
         "source": motion.source,
     }
+    if motion.warnings:
+        arrays["warnings"] = np.array(motion.warnings)
     for field in _OFFSETS:
         if getattr(motion, field) is not None:
             arrays[field] = getattr(motion, field)
@@ -155,6 +159,7 @@ def load_motion_file(path: str | Path) -> Motion:
             tip_offset=offsets.get("tip_offset"),
             side=text(path, a, "side"),
             source=text(path, a, "source"),
+            warnings=texts(path, a, "warnings", needed=False),
         ),
         name=str(path),
     )

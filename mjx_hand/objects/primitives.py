@@ -66,6 +66,39 @@ def half_extents(kind: str, size: Float[Array | np.ndarray, "*b 3"]) -> Float[Ar
     return jnp.asarray(size)
 
 
+def face_along(
+    kind: str,
+    size: Float[Array, "3"],
+    normal: Float[Array, "3"],
+    aside: Float[Array, "3"],
+    planes: Float[Array | np.ndarray, "h f 4"],
+) -> tuple[Float[Array, "3"], Float[Array, "3"]]:
+    """Where an object's surface is, seen from outside along a direction: the place (m) and the outward normal there.
+
+    Of a simple shape it is the side of the bounding box. Of a mesh it is where the line through `aside` leaves the
+    outermost piece; NaN where it meets none.
+
+    Args:
+        kind, size: as in `signed_distance`.
+        normal: unit direction outwards, in the object's frame.
+        aside: a point of the line (m).
+        planes: of a mesh, those of its pieces (`hull_planes`); of others empty.
+    """
+    if kind != "mesh":
+        return normal * (jnp.abs(normal) @ half_extents(kind, size)) + aside, normal
+    planes = jnp.asarray(planes)
+    slope = planes[..., :3] @ normal
+    reach = -(planes[..., :3] @ aside + planes[..., 3])  # along the line, times the slope
+    along = reach / jnp.where(jnp.abs(slope) < 1e-6, 1e-6, slope)
+    leaves = jnp.where(slope >= 1e-6, along, jnp.inf)
+    enters = jnp.where(slope <= -1e-6, along, -jnp.inf).max(axis=-1)
+    beside = ((jnp.abs(slope) < 1e-6) & (reach < 0)).any(axis=-1)  # parallel to a face, and outside of it
+    out = jnp.where((enters < leaves.min(axis=-1)) & ~beside, leaves.min(axis=-1), -jnp.inf)
+    piece = jnp.argmax(out)
+    distance = jnp.where(jnp.isfinite(out[piece]), out[piece], jnp.nan)
+    return aside + distance * normal, planes[piece, jnp.argmin(leaves[piece]), :3]
+
+
 def _norm(v: Float[Array, "*b n"]) -> Float[Array, "*b"]:
     return jnp.sqrt(jnp.sum(v * v, axis=-1) + 1e-14)  # the constant keeps the gradient at the centre finite
 

@@ -19,7 +19,7 @@ from mjx_hand.retarget.hands import KinematicHands
 from mjx_hand.retarget.ledger import NAME as LEDGER
 from mjx_hand.retarget.ledger import Ledger, key_of
 from mjx_hand.retarget.options import RetargetOptions
-from mjx_hand.retarget.sequence import errors_of_many, retarget_many
+from mjx_hand.retarget.sequence import errors_of_many, plausible_angles, retarget_many
 from mjx_hand.retarget.smoothing import penalty
 from mjx_hand.retarget.summary import FAILED, Outcome, outcome_of, write_summary
 from mjx_hand.rigid.rigid_hand import RigidHand
@@ -198,8 +198,15 @@ def _finished(batch: Sequence[_Loaded], options: RetargetOptions, ledger: Ledger
     motions, hands = [b.motion for b in batch], [b.rigid for b in batch]
     made = retarget_many(motions, hands, options)
     errors = errors_of_many(motions, made, hands)
-    for loaded, joints, error in zip(batch, made, errors, strict=True):
-        item, row = loaded.item, outcome_of(loaded.item.file, loaded.motion, error)
+    for loaded, angles, error in zip(batch, made, errors, strict=True):
+        item = loaded.item
+        try:
+            joints = plausible_angles(angles, loaded.rigid)
+        except InputError as refusal:
+            item.output.unlink(missing_ok=True)  # of an earlier run
+            yield item, Outcome(item.file, FAILED, message=str(refusal))
+            continue
+        row = outcome_of(item.file, loaded.motion, error, joints.warnings)
         save_joint_motion(joints, item.output)
         ledger.add(row, item.key, item.output)
         yield item, row

@@ -8,10 +8,13 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from mjx_hand.errors import InputError
+from mjx_hand.hand.joints import HINGES
 from mjx_hand.hand.model import HandModel
 from mjx_hand.motion import JointMotion, Motion, check_motion
 from mjx_hand.motion.gaps import fill_lines, fill_turns
-from mjx_hand.pytree import pytree
+from mjx_hand.motion.plausibility.finding import judged
+from mjx_hand.motion.plausibility.pose import angle_findings
+from mjx_hand.pytree import pytree, replace
 from mjx_hand.retarget.frames import angles_of, errors_of, hand_table, in_chunks
 from mjx_hand.retarget.options import RetargetOptions
 from mjx_hand.retarget.smoothing import penalty, smooth, unwrap
@@ -191,7 +194,19 @@ def _over_time(
         valid=valid,
         side=motion.side,
         source=motion.source,
+        warnings=motion.warnings,
     )
+
+
+def plausible_angles(joints: JointMotion, rigid: RigidHand) -> JointMotion:
+    """`joints` with a warning where they are far beyond the hand's ranges of motion.
+
+    Raises:
+        InputError: they are so far beyond that this is no hand.
+    """
+    lower, upper = np.asarray(rigid.hinge_lower), np.asarray(rigid.hinge_upper)
+    found = angle_findings(joints.angles, lower, upper, joints.valid, HINGES)
+    return replace(joints, warnings=judged(joints.source or "motion", found, joints.warnings))
 
 
 def _padded(

@@ -27,6 +27,7 @@ class Outcome:
         frames, gaps, fps, seconds: of the recording.
         rotation_*: degrees, over the 15 joints. joint_*: mm, over the ten outer joints. tip_*: mm, over the five tips.
         message: why it failed.
+        warnings: what is doubtful about it.
     """
 
     file: str
@@ -45,9 +46,10 @@ class Outcome:
     tip_95_mm: float = 0.0
     tip_max_mm: float = 0.0
     message: str = ""
+    warnings: str = ""
 
 
-def outcome_of(file: str, motion: Motion, errors: RetargetErrors) -> Outcome:
+def outcome_of(file: str, motion: Motion, errors: RetargetErrors, warnings: tuple[str, ...] = ()) -> Outcome:
     """The row of a recording that was retargeted."""
     good = errors.valid
     figures = {}
@@ -66,6 +68,7 @@ def outcome_of(file: str, motion: Motion, errors: RetargetErrors) -> Outcome:
         gaps=motion.num_frames - int(good.sum()),
         fps=float(motion.fps),
         seconds=round(motion.num_frames / motion.fps, 3),
+        warnings=" | ".join(warnings),
         **figures,
     )
 

@@ -27,4 +27,5 @@ def motion_keypoints(motion: Motion, rigid: RigidHand) -> KeypointRecording:
         positions=np.where(motion.valid[:, None, None], world, np.nan),
         side=motion.side,
         source=motion.source,
+        warnings=motion.warnings,
     )

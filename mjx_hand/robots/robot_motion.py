@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from mjx_hand.errors import InputError
-from mjx_hand.files.checked_arrays import numbers, text, texts
+from mjx_hand.files.checked_arrays import Lines, numbers, text, texts
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 from mjx_hand.motion.resample import quaternion_matrices
 from mjx_hand.pytree import pytree, static
@@ -32,6 +32,7 @@ class RobotMotion:
         joint_names: the URDF's names, in the order of `values`.
         robot: the description's name.
         source: provenance, one line.
+        warnings: what is doubtful about it, one line each.
     """
 
     fps: float
@@ -42,6 +43,7 @@ class RobotMotion:
     joint_names: tuple[str, ...] = static()
     robot: str = static(default="")
     source: str = static(default="")
+    warnings: Lines = static(default=())
 
 
 def save_robot_motion(motion: RobotMotion, path: str | Path) -> None:
@@ -52,6 +54,8 @@ def save_robot_motion(motion: RobotMotion, path: str | Path) -> None:
     """
     names = ("fps", "base_position", "base_quaternion", "valid", "robot", "source")
     arrays = {name: getattr(motion, name) for name in names}
+    if motion.warnings:
+        arrays["warnings"] = np.array(motion.warnings)
     save_arrays(path, SCHEMA, {**arrays, "angles": motion.values, "joint_names": np.array(motion.joint_names)})
 
 
@@ -76,6 +80,7 @@ def load_robot_motion(path: str | Path) -> RobotMotion:
         joint_names=names,
         robot=text(path, arrays, "robot"),
         source=text(path, arrays, "source"),
+        warnings=texts(path, arrays, "warnings", needed=False),
     )
 
 

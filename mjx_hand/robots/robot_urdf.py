@@ -15,6 +15,7 @@ import yourdfpy
 from yourdfpy.urdf import Joint
 
 from mjx_hand.errors import InputError
+from mjx_hand.files.input_file import refuse_pointer
 from mjx_hand.robots.solver.kinematic_tree import BASE, KinematicTree, z_frame
 
 _MOVABLE = ("revolute", "continuous", "prismatic")
@@ -51,6 +52,7 @@ def robot_tree(path: str | Path, links: Sequence[str]) -> KinematicTree:
 def _read(path: Path) -> yourdfpy.Robot:
     if not path.is_file():
         raise InputError(f"{path}: {'a folder' if path.is_dir() else 'no such file'}; give the path of a URDF")
+    refuse_pointer(path)
     try:
         ElementTree.parse(path)  # yourdfpy takes what it can of a file that is cut short
         with _quiet("yourdfpy.urdf"):

@@ -68,8 +68,8 @@ def test_refusals_name_what_was_found_and_what_is_read(tmp_path):
         "text.npz": "not a readable .npz file",
         "marks.c3d": "a marker recording: name its marker set, markers='hand22' or a YAML file, or run mjx-hand fit",
         "pose.pkl": "a lone NoneType without names",
-        "other.npz": "an .npz of a0, a1, a2, a3, a4, a5 and more; formats read: ARCTIC",
-        "pickled.npz": "an .npz of a; formats read",
+        "other.npz": "an .npz of a0 (2,), a1 (2,), a2 (2,), a3 (2,), a4 (2,), a5 (2,) and more; keypoints are",
+        "pickled.npz": "an .npz of a (1,); keypoints are",
     }
     for name, message in expected.items():
         with pytest.raises(InputError) as refusal:

@@ -104,8 +104,9 @@ def test_real_recordings(recordings, capsys):
     leap = recordings / "leap_motion"
     assert "20 of 21, layout leap, never wrist" in info(capsys, leap / "pinch.npz")
     text = info(capsys, leap / "confidence-37fps.npz")
-    assert "right_28 (46 frames), left_29" in text
-    assert "choose with side= or sequence=" in text
+    assert "right_28+right_30+right_31 (" in text
+    assert "choose with --side or --sequence" in text
+    assert "found again as right_30, right_31" in info(capsys, leap / "confidence-37fps.npz", "--side", "right")
     assert "393 at" in info(capsys, leap / "confidence-37fps.npz", "--sequence", "right_31")
     text = info(capsys, recordings / "dexmv_mustard" / "sequence.npz")
     assert "DexMV" in text
@@ -116,7 +117,7 @@ def test_real_recordings(recordings, capsys):
         assert "thumb_tip 8.2 %" in text
         assert "--markers glove13 --out recording.motion.npz" in text
     assert "next: mjx-hand track" in info(capsys, recordings / "mediapipe_video" / "human_hand_video.mp4")
-    assert "nothing that is known here; known are" in refused(
+    assert "nothing that is known here, but a binary .stl file of " in refused(
         capsys, recordings / "dexmv_mustard" / "mustard_bottle.stl"
     )
 

@@ -38,7 +38,7 @@ def test_real_recording(recordings, tmp_path, capsys):
     ("scale", "options", "says"),
     [
         (1000.0, ["--fps", "50"], "about 1000 times too big"),
-        (1.0, [], "does not say its frame rate; give fps"),
+        (1.0, [], "does not say its frame rate; give fps, as in --fps 30"),
         (1.0, ["--fps", "50", "--side", "left"], "its fingers bend as a right hand's"),
         (1.0, ["--fps", "50", "--cutoff", "40"], "cut-off is 40.0 Hz"),
         (1.0, ["--fps", "50", "--sequence", "thumb"], "has no hand 'thumb'"),

@@ -1,3 +1,5 @@
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import mujoco
@@ -89,8 +91,9 @@ def test_every_kind_of_object_has_finite_offsets(demonstrations, hands, in_hand)
     where = tuple(leaf[-2:] for leaf in in_hand)
     corners = 0.017 * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     planes = jnp.asarray(hull_planes(corners[None]), jnp.float32)
+    offsets = jax.jit(partial(grip_offsets, size=jnp.full(3, 0.017), force=8.0, gains=Gains()), static_argnames="kind")
     for kind in OBJECT_KINDS:
-        found = grip_offsets(angles, where, hand, kind, jnp.full(3, 0.017), 8.0, Gains(), planes)
+        found = offsets(angles, where, hand, kind=kind, planes=planes)
         assert np.isfinite(np.asarray(found)).all()
         assert np.abs(np.asarray(found)[:, THUMB]).max() > 0.01
 
@@ -99,7 +102,8 @@ def test_a_weak_joint_is_not_asked_for_more_than_it_has(demonstrations, hands, i
     d = demonstrations[0]
     hand = jax.tree.map(lambda leaf: leaf[0], stack_hands(hands[:1]))
     weak = Gains(force_limit=np.full(20, 0.01))
-    args = (jnp.asarray(d.motion.angles[-2:], jnp.float32), tuple(leaf[-2:] for leaf in in_hand), hand, d.object.kind)
+    angles, where = jnp.asarray(d.motion.angles[-2:], jnp.float32), tuple(leaf[-2:] for leaf in in_hand)
     size = jnp.asarray(d.object.size, jnp.float32)
-    pressing = np.asarray(grip_offsets(*args, size, 8.0, weak)) - np.asarray(grip_offsets(*args, size, 0.0, weak))
+    with_force = jax.jit(lambda force: grip_offsets(angles, where, hand, d.object.kind, size, force, weak))
+    pressing = np.asarray(with_force(8.0)) - np.asarray(with_force(0.0))
     assert (np.abs(pressing) <= 0.01 / weak.stiffness + 1e-6).all()

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.scripted.trials import support_boxes
 from envs.grasps import grasp_names, grasp_type
-from envs.scene import NUM_WRIST, OBJECT, SUPPORT, TABLE, TIMESTEP, base_rotation, scene_model, wrist_coordinates
+from envs.scene import NUM_WRIST, OBJECT, SUPPORT, TABLE, TIMESTEP, base_rotation, scene_spec, wrist_coordinates
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import HINGES, NUM_HINGES
 from mjx_hand.objects.description import ObjectDescription
@@ -21,7 +21,7 @@ from mjx_hand.rigid.rigid_hand import forward_kinematics
 @pytest.fixture(scope="module")
 def model(demonstrations, hands):
     d = demonstrations[0]
-    return scene_model(hands[0], d.object, d.support, d.support_position, base_rotation(d))
+    return scene_spec(hands[0], d.object, d.support, d.support_position, base_rotation(d)).compile()
 
 
 def test_joints_and_actuators_run_in_one_order(model):
@@ -115,7 +115,7 @@ def test_a_demonstrations_poses_are_reached_by_the_scene(model, demonstrations, 
 def test_an_unknown_kind_of_object_is_refused(hands):
     cone = ObjectDescription(kind="cone", size=np.ones(3), mass=0.1, friction=1.0)
     with pytest.raises(InputError, match=r"'cone' is not known; valid: box, sphere, cylinder, capsule, mesh"):
-        scene_model(hands[0], cone, np.ones((1, 3)), np.zeros((1, 3)), np.eye(3))
+        scene_spec(hands[0], cone, np.ones((1, 3)), np.zeros((1, 3)), np.eye(3)).compile()
 
 
 @pytest.mark.parametrize("name", grasp_names())
@@ -123,7 +123,7 @@ def test_every_grasp_type_has_a_scene_that_mjx_can_run(name, hands):
     """MJX lacks some pairs of shapes, a cylinder on a box among them."""
     grasp = grasp_type(name)
     description = ObjectDescription(kind=grasp.object_kind, size=np.array(grasp.object_size[0]), mass=0.1, friction=1.0)
-    scene = scene_model(hands[0], description, *support_boxes(grasp), np.array(grasp.wrist_rotation))
+    scene = scene_spec(hands[0], description, *support_boxes(grasp), np.array(grasp.wrist_rotation)).compile()
     mjx.put_model(scene, impl="jax")
     data = mujoco.MjData(scene)
     data.qpos[2], data.ctrl[2] = 0.5, 0.5

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mjx_hand.capture.datasets.contents import read_contents
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import text, texts
+from mjx_hand.files.contents import read_contents
 from mjx_hand.files.npz_archive import load_arrays, open_arrays, save_arrays, schema_of
 
 HEADER = "{'descr': '<f8', 'fortran_order': False, 'shape': (%s), }"

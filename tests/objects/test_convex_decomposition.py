@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from envs.scene import OBJECT, scene_model
+from envs.scene import OBJECT, scene_spec
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
 from mjx_hand.objects.convex_decomposition import convex_pieces
@@ -79,7 +79,7 @@ def test_surface_points_lie_on_the_outside_alone(described, angle):
 def test_physics_has_its_mass_and_its_shape(described):
     model = load_hand()
     hand = build_rigid_hand(model, np.zeros(model.num_shape))
-    scene = scene_model(hand, described, np.zeros((0, 3)), np.zeros((0, 3)), np.eye(3))
+    scene = scene_spec(hand, described, np.zeros((0, 3)), np.zeros((0, 3)), np.eye(3)).compile()
     body = scene.body(OBJECT)
     whole = trimesh.Trimesh(*_joined())
     assert body.mass[0] == pytest.approx(0.2)

@@ -27,7 +27,7 @@ PLAIN = RetargetOptions()
 
 def made(frames: int, seed: int) -> Motion:
     rng = np.random.default_rng(seed)
-    turn = np.cumsum(0.02 * rng.normal(size=(frames, 15, 3)), axis=0)
+    turn = np.array([0.0, 0.0, 0.3]) + 0.4 * np.sin(np.cumsum(0.05 * rng.normal(size=(frames, 15, 3)), axis=0))
     valid = rng.random(frames) > 0.1
     valid[0] = True
     rotations = Rotation.from_rotvec(turn.reshape(-1, 3)).as_matrix().reshape(frames, 15, 3, 3)
@@ -180,6 +180,7 @@ print("finished")
 """
 
 
+@pytest.mark.slow
 def test_killed_again_and_again_it_finishes_with_the_same_files(tmp_path):
     """Real kills (SIGKILL) while outputs appear; then one run to the end, equal to a run that was never stopped."""
     count = 20
@@ -220,7 +221,7 @@ def test_all_devices_share_the_frames(tmp_path):
     save_motion(made(500, 1), tmp_path / "in" / "a.npz")
     where = [str(tmp_path / "in"), str(tmp_path / "out")]
     program = f"{RUN}\nimport jax\nprint(len(jax.local_devices()), 'devices')"
-    environment = os.environ | {"XLA_FLAGS": "--xla_force_host_platform_device_count=3"}
+    environment = os.environ | {"XLA_FLAGS": f"{os.environ['XLA_FLAGS']} --xla_force_host_platform_device_count=3"}
     run = subprocess.run([sys.executable, "-c", program, *where], capture_output=True, text=True, env=environment)
     assert "3 devices" in run.stdout, run.stderr
     motion = made(500, 1)

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 import train.ppo
+from envs.demonstrations.dataset import make_missing_sets
 from envs.demonstrations.set_settings import SetSettings, set_folder
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import load_demonstration, save_demonstration
 from mjx_hand.pytree import replace
 from train.experiment.evaluate_seeds import POLICY, evaluate_seeds
-from train.experiment.setup import load_env, make_sets
+from train.experiment.setup import load_env
 from train.play import viewer
 from train.reports.evaluation_record import evaluation_fingerprint
 from train.settings.config import Config, compose
@@ -82,11 +83,11 @@ def test_a_missing_set_is_made_by_a_step_of_its_own_which_says_so(tiny: Config, 
     monkeypatch.setattr(
         "envs.demonstrations.dataset.make_set", lambda settings, root, report: made.append((settings, root))
     )
-    make_sets(config)
+    make_missing_sets(config.data, config.demonstrations)
     assert made == [(tiny.data, str(tmp_path))]
     assert f"{set_folder(tiny.data, tmp_path)} is missing: making the demonstrations" in capsys.readouterr().out
     made.clear()
-    make_sets(tiny)
+    make_missing_sets(tiny.data, tiny.demonstrations)
     assert not made
     assert not capsys.readouterr().out
 

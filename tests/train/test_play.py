@@ -63,6 +63,7 @@ def test_a_demonstration_that_is_not_there(trained: Trained, tiny: Config):
         Play(demonstration=-1)
 
 
+@pytest.mark.slow
 def test_a_browser_shows_it(playing: Viewer, tmp_path: Path):
     chromium = find_chromium()
     if chromium is None:

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
+from envs.demonstrations.dataset import make_missing_sets
 from envs.demonstrations.set_settings import SetSettings
 from envs.grasps import grasp_names, grasp_type
 from envs.physics import ENGINES, default_engine
@@ -27,7 +28,7 @@ from train.benchmark.engine_report import Results, Row, text, write
 from train.benchmark.learning import Learning, measure_learning
 from train.benchmark.memory import fitting, with_memory
 from train.benchmark.timing import rates
-from train.experiment.setup import load_env, make_sets
+from train.experiment.setup import load_env
 from train.reports.machine import accelerator
 from train.settings.config import Config
 
@@ -154,7 +155,7 @@ def config(engine: str, grasp: str, demonstrations: Path) -> Config:
 def small_env(engine: str, grasp: str, demonstrations: Path) -> TrackingEnv:
     """The environment of `config`; its set is made where it is missing."""
     measured = config(engine, grasp, demonstrations)
-    make_sets(measured)
+    make_missing_sets(measured.data, measured.demonstrations)
     return load_env(measured, "train")
 
 

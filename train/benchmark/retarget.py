@@ -70,6 +70,7 @@ def report(options: Options) -> list[str]:
     for name in ("poses", "runs", "scipy_poses"):
         if getattr(options, name) < 1:
             raise InputError(f"{name} is {getattr(options, name)}; give at least 1")
+    motion = load_motion(options.recording) if options.recording is not None else None  # refused before it takes time
     hand = load_hand()
     rigid = build_rigid_hand(hand)
     lines = [
@@ -81,8 +82,7 @@ def report(options: Options) -> list[str]:
     lines += accuracy_table(random_poses(rigid, ACCURACY_POSES, seed=0), rigid, options.runs)
     for name, (mean, largest, milliseconds) in PAPER.items():
         lines.append(f"| *paper's Table 1, {name}* | | | {mean:.2f} / {largest:.2f} / – | {milliseconds:.2f} |")
-    if options.recording is not None:
-        motion = load_motion(options.recording)
+    if motion is not None and options.recording is not None:
         recorded = jnp.asarray(motion.rotations[motion.valid], jnp.float32)
         lines += ["", f"## {options.recording.parent.name}/{options.recording.name}, {len(recorded)} frames", ""]
         lines += accuracy_table(recorded, KinematicHands().of(motion), options.runs)

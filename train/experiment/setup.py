@@ -4,13 +4,11 @@ import dataclasses
 from collections.abc import Collection
 from pathlib import Path
 
-from envs.demonstrations.dataset import make_missing_sets
 from envs.demonstrations.load_env import env_of_set
 from envs.demonstrations.load_set import is_divided
 from envs.evaluation.evaluate import Evaluation, evaluate
 from envs.evaluation.roll_out import make_roll_out
 from envs.evaluation.rollout import Rollouts
-from envs.physics.engine import available_engine
 from envs.scene import NUM_WRIST
 from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
@@ -20,17 +18,6 @@ from train.learning.policy import check_policy, deterministic_policy
 from train.learning.run_folder import BEST
 from train.settings.config import Config
 from train.settings.saved import FILE, contradiction, policy_settings, read_settings, with_settings_of
-
-
-def make_sets(config: Config) -> None:
-    """Make those demonstration sets of the experiment that are missing, and say so; `load_env` reads them.
-
-    Raises:
-        InputError: an engine that is not installed, before anything is made, or as
-            `envs.demonstrations.dataset.make_set`.
-    """
-    available_engine(config.engine)
-    make_missing_sets(config.data, config.demonstrations)
 
 
 def load_env(config: Config, part: str) -> TrackingEnv:

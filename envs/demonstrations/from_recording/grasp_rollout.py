@@ -15,7 +15,7 @@ from envs.grip import grip_offsets
 from envs.physics.solver import gauss_seidel
 from envs.reference import anticipated
 from envs.replay import with_heavy_object
-from envs.scene import NUM_WRIST, TIMESTEP, scene_model, wrist_coordinates
+from envs.scene import NUM_WRIST, TIMESTEP, scene_spec, wrist_coordinates
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.motion.resample import matrix_quaternions
 from mjx_hand.rigid.gains import Gains
@@ -57,7 +57,7 @@ class GraspRollout:
         self.base = observed.hand_rotation[0]
         self.fps = 1 / (observed.times[1] - observed.times[0])
         self.substeps = round(1 / (self.fps * TIMESTEP))
-        model = scene_model(act.hand, description, _NO_BOXES, _NO_BOXES, self.base, gains=self.gains)
+        model = scene_spec(act.hand, description, _NO_BOXES, _NO_BOXES, self.base, gains=self.gains).compile()
         (self.model,) = gauss_seidel([model])
         self.heavy = with_heavy_object(self.model)
         self.worlds = batch.Batch(self.model, nsim=count)

@@ -11,7 +11,8 @@ from scipy.optimize import nnls
 
 from envs.grasps import GraspType, Pads, Wrap
 from mjx_hand.hand.joints import FINGERS, LINKS, NUM_HINGES
-from mjx_hand.objects.primitives import half_extents, signed_distance
+from mjx_hand.objects.description import ObjectDescription
+from mjx_hand.objects.primitives import face_along, half_extents, hull_planes, signed_distance
 from mjx_hand.pytree import pytree
 from mjx_hand.rigid.capsules import capsule_points, last_capsule
 from mjx_hand.rigid.gains import Gains
@@ -50,12 +51,14 @@ class Posture:
     contact_point: Float[Array, "*b c 3"]
 
 
-def solve_postures(grasp: GraspType, hands: Sequence[RigidHand], sizes: Float[np.ndarray, "n 3"]) -> Posture:
-    """The posture of each hand on an object of the size beside it (leading axis n)."""
-    parts = []
+def solve_postures(grasp: GraspType, hands: Sequence[RigidHand], objects: Sequence[ObjectDescription]) -> Posture:
+    """The posture of each hand on the object beside it (leading axis n); the objects are of one kind and one mesh."""
+    kind, planes, parts = objects[0].kind, jnp.asarray(hull_planes(objects[0].hulls), jnp.float32), []
+    sizes = np.stack([description.size for description in objects])
     for start in range(0, len(hands), _BATCH):
         rows = [min(start + k, len(hands) - 1) for k in range(_BATCH)]  # the last batch repeats its last hand
-        parts.append(_solve_all(grasp, stack_hands([hands[k] for k in rows]), jnp.asarray(sizes[rows], jnp.float32)))
+        batch = stack_hands([hands[k] for k in rows]), jnp.asarray(sizes[rows], jnp.float32)
+        parts.append(_solve_all(grasp, kind, *batch, planes))
     return jax.tree.map(lambda *leaves: jnp.concatenate(leaves)[: len(hands)], *parts)
 
 
@@ -95,22 +98,23 @@ def opened_angles(closing: Pads | Wrap, posture: Posture) -> Float[np.ndarray, "
     return np.asarray(posture.angles) + away
 
 
-@partial(jax.jit, static_argnums=0)
-def _solve_all(grasp: GraspType, hands: RigidHand, sizes: Array) -> Posture:
-    return jax.vmap(partial(_solve, grasp))(hands, sizes)
+@partial(jax.jit, static_argnums=(0, 1))
+def _solve_all(grasp: GraspType, kind: str, hands: RigidHand, sizes: Array, planes: Array) -> Posture:
+    return jax.vmap(partial(_solve, grasp, kind), in_axes=(0, 0, None))(hands, sizes, planes)
 
 
-def _solve(grasp: GraspType, hand: RigidHand, size: Array) -> Posture:
+def _solve(grasp: GraspType, kind: str, hand: RigidHand, size: Array, planes: Array) -> Posture:
     capsules = jnp.array([last_capsule(hand, LINKS.index(contact.link)) for contact in grasp.contacts])
     along = jnp.array([contact.along for contact in grasp.contacts])
     seed_angles, seed_rotation = jnp.array(grasp.posture), jnp.array(grasp.wrist_rotation)
     world_from_object = jnp.array(grasp.object_rotation)
     radius = hand.capsule_radius
     wraps = isinstance(grasp.closing, Wrap)
+    faces = (jnp.zeros(0),) * 2 if wraps else _faces(grasp, kind, size, planes)
     slack = jnp.full(len(hand.capsule_links), 0.0 if wraps else 0.001).at[capsules].set(-_INTO)
 
     def distance(points: Array) -> Array:
-        return signed_distance(grasp.object_kind, size, points @ world_from_object)
+        return signed_distance(kind, size, points @ world_from_object, planes)
 
     def axis_points(x: Array) -> Array:
         """World points on the capsules' axes, (capsules, along, 3)."""
@@ -126,9 +130,8 @@ def _solve(grasp: GraspType, hand: RigidHand, size: Array) -> Posture:
         """Of each contact, how far off the surface it is, and its way (m) along the face from where it should be."""
         if wraps:
             return distance(contacts(x)) - radius[capsules] + _INTO, jnp.zeros(0)
-        normals, aside = _faces(grasp)
-        target = normals * (jnp.abs(normals) @ half_extents(grasp.object_kind, size))[:, None] + aside
-        target += normals * radius[capsules][:, None]
+        places, normals = faces
+        target = places + normals * radius[capsules][:, None]
         gap = contacts(x) @ world_from_object - target
         towards = jnp.sum(gap * normals, axis=-1)
         return towards, (gap - towards[:, None] * normals).ravel()
@@ -137,7 +140,7 @@ def _solve(grasp: GraspType, hand: RigidHand, size: Array) -> Posture:
         towards, sideways = gaps(x)
         points = axis_points(x)
         clear = distance(points) - (radius + slack)[:, None]
-        height = jnp.abs(world_from_object[2]) @ half_extents(grasp.object_kind, size)
+        height = jnp.abs(world_from_object[2]) @ half_extents(kind, size)
         above = points + jnp.array([0.0, 0.0, grasp.rest]) + height * jnp.array([0.0, 0.0, 1.0])
         ground = [above[..., 2]]
         ground += [signed_distance("box", jnp.array(box.half), above - jnp.array(box.centre)) for box in grasp.support]
@@ -167,7 +170,7 @@ def _solve(grasp: GraspType, hand: RigidHand, size: Array) -> Posture:
     # Begin with the object in its place, or the contacts' centre on the object's: the solver needs no other guess.
     centre = seed_rotation @ out_of_place(start) if wraps else -contacts(start).mean(axis=0)
     x = _levenberg_marquardt(residual, start.at[-3:].add(centre))
-    normals = jax.vmap(jax.grad(distance))(contacts(x)) if wraps else _faces(grasp)[0] @ world_from_object.T
+    normals = jax.vmap(jax.grad(distance))(contacts(x)) if wraps else faces[1] @ world_from_object.T
 
     def skin_points(angles: Array) -> Array:
         held = x.at[:NUM_HINGES].set(angles)
@@ -185,9 +188,12 @@ def _solve(grasp: GraspType, hand: RigidHand, size: Array) -> Posture:
     )
 
 
-def _faces(grasp: GraspType) -> tuple[Array, Array]:
-    """The contacts' normals and places on their faces, in the object's frame."""
-    return jnp.array([contact.normal for contact in grasp.contacts]), jnp.array([c.aside for c in grasp.contacts])
+def _faces(grasp: GraspType, kind: str, size: Array, planes: Array) -> tuple[Array, Array]:
+    """Where each contact should be on its face, and the face's normal there, in the object's frame."""
+    out = [jnp.array(contact.normal) for contact in grasp.contacts]
+    aside = [jnp.array(contact.aside) for contact in grasp.contacts]
+    found = [face_along(kind, size, way, past, planes) for way, past in zip(out, aside, strict=True)]
+    return jnp.stack([place for place, _ in found]), jnp.stack([normal for _, normal in found])
 
 
 def _levenberg_marquardt(residual, x):  # type: ignore[no-untyped-def]

@@ -51,7 +51,7 @@ def perform(
     """Run each model under its controls, one row a physics step, from its first control's pose.
 
     Args:
-        models: scenes (`envs.scene.scene_model`) on the engine's settings.
+        models: scenes (`envs.scene.scene_spec`) on the engine's settings.
         bases: world_from_base of each scene's wrist.
         controls: targets of the wrist's six joints and the hinges.
         object_start: where each object stands.

@@ -12,11 +12,12 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.scripted.grasp_posture import Posture, opened_angles, solve_postures, squeeze_angles
+from envs.demonstrations.scripted.own_object import OwnObject
 from envs.demonstrations.scripted.perform import OUTCOMES, Performance, perform
 from envs.demonstrations.scripted.script import GraspMotion, Tempo, scripted_targets
 from envs.grasps import GraspType
 from envs.physics.solver import gauss_seidel
-from envs.scene import TIMESTEP, scene_model, wrist_coordinates
+from envs.scene import TIMESTEP, scene_spec, wrist_coordinates
 from mjx_hand.errors import InputError
 from mjx_hand.objects.description import ObjectDescription
 from mjx_hand.objects.primitives import half_extents
@@ -73,6 +74,7 @@ def perform_trials(
     per_person: int,
     seed: int,
     report: Callable[[int, int], None] = lambda kept, tried: None,
+    own: OwnObject | None = None,
 ) -> tuple[list[Trial], Mapping[str, int]]:
     """`per_person` successful trials of each hand, in the order of the hands; and what came of all attempts.
 
@@ -84,6 +86,7 @@ def perform_trials(
         per_person: how many of each.
         seed: of every random draw.
         report: called after each batch with the trials kept and tried so far.
+        own: grasped in place of the type's objects.
 
     Raises:
         InputError: after several batches some hand has not succeeded often enough.
@@ -99,7 +102,7 @@ def perform_trials(
         # A fixed batch size, so that the posture solver compiles once: fill up with spare attempts of the same people.
         size = -(-len(hands) * per_person * 5 // 4)
         people = [missing[k % len(missing)] for k in range(size)]
-        held, outcomes = _attempt(grasp, [hands[p] for p in people], people, rng)
+        held, outcomes = _attempt(grasp, [hands[p] for p in people], people, rng, own)
         tally.update(outcomes)
         for trial in held:
             if len(kept[trial.person]) < per_person:
@@ -110,8 +113,9 @@ def perform_trials(
         report(sum(map(len, kept.values())), tried)
     short = [p for p, trials in kept.items() if len(trials) < per_person]
     if short:
+        what = f"{grasp.name!r} of {own.path}" if own else repr(grasp.name)
         raise InputError(
-            f"grasp {grasp.name!r}: hands {short} held fewer than {per_person} objects in {tried} attempts "
+            f"grasp {what}: hands {short} held fewer than {per_person} objects in {tried} attempts "
             f"({_told(tally)}); use other shapes, smaller objects, or mend the type's posture"
         )
     return [trial for trials in kept.values() for trial in trials], tally
@@ -122,10 +126,14 @@ def _told(tally: Mapping[str, int]) -> str:
 
 
 def _attempt(
-    grasp: GraspType, hands: Sequence[RigidHand], people: Sequence[int], rng: np.random.Generator
+    grasp: GraspType,
+    hands: Sequence[RigidHand],
+    people: Sequence[int],
+    rng: np.random.Generator,
+    own: OwnObject | None,
 ) -> tuple[list[Trial], list[str]]:
     """One batch of random trials: those that held, and what came of each."""
-    scripts = draw_scripts(grasp, hands, rng)
+    scripts = draw_scripts(grasp, hands, rng, own)
     unsolved = [NO_POSTURE] * (len(hands) - len(scripts))
     if not scripts:
         return [], unsolved
@@ -141,17 +149,19 @@ def _attempt(
     return held, unsolved + [OUTCOMES[k] for k in done.outcome]
 
 
-def draw_scripts(grasp: GraspType, hands: Sequence[RigidHand], rng: np.random.Generator) -> list[Script]:
+def draw_scripts(
+    grasp: GraspType, hands: Sequence[RigidHand], rng: np.random.Generator, own: OwnObject | None = None
+) -> list[Script]:
     """A random grasp of each hand, less those for whose object no posture is found."""
-    descriptions = [_draw_object(grasp, rng) for _ in hands]
-    solved = solve_postures(grasp, hands, np.stack([description.size for description in descriptions]))
+    descriptions = [_draw_object(grasp, rng, own) for _ in hands]
+    solved = solve_postures(grasp, hands, descriptions)
     postures = [jax.tree.map(lambda leaf, k=k: np.asarray(leaf[k], float), solved) for k in range(len(hands))]
     gains = Gains()
     lying = np.array(grasp.object_rotation)
     upright = Rotation.from_matrix(lying).as_quat(scalar_first=True)
     scripts = []
     for k, (hand, description, posture) in enumerate(zip(hands, descriptions, postures, strict=True)):
-        if posture.touch_error >= _TOUCH_LIMIT:
+        if not posture.touch_error < _TOUCH_LIMIT:  # NaN where a mesh has no face that the type touches
             continue
         reach = np.abs(lying[2]) @ np.asarray(half_extents(description.kind, jnp.asarray(description.size)))
         centre = np.array([0.0, 0.0, grasp.rest + reach])
@@ -162,7 +172,7 @@ def draw_scripts(grasp: GraspType, hands: Sequence[RigidHand], rng: np.random.Ge
                 object_start=np.concatenate([centre, upright]),
                 motion=_draw_motion(grasp, posture, centre, hand, gains, rng),
                 base=posture.rotation,
-                model=scene_model(hand, description, *support_boxes(grasp), posture.rotation, gains=gains),
+                model=scene_spec(hand, description, *support_boxes(grasp), posture.rotation, gains=gains).compile(),
             )
         )
     return scripts
@@ -186,7 +196,9 @@ def _trial(done: Performance, row: int, person: int, script: Script) -> Trial:
     )
 
 
-def _draw_object(grasp: GraspType, rng: np.random.Generator) -> ObjectDescription:
+def _draw_object(grasp: GraspType, rng: np.random.Generator, own: OwnObject | None) -> ObjectDescription:
+    if own is not None:
+        return own.draw(grasp, rng)
     low, high = map(np.array, grasp.object_size)
     return ObjectDescription(
         kind=grasp.object_kind,

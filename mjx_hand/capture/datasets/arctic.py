@@ -18,12 +18,12 @@ The object (`SEQUENCE.object.npy`) and the body are not read.
 
 from pathlib import Path
 
-from mjx_hand.capture.datasets.contents import plain, unwrapped
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
 from mjx_hand.capture.datasets.mano_motion import chosen_side, mano_motion, recorded, turns
 from mjx_hand.capture.datasets.subject import full_pose, one_shape, subject_of
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import numbers
+from mjx_hand.files.contents import plain, unwrapped
 from mjx_hand.motion import Motion
 
 FPS = 30.0

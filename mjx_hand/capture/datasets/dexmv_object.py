@@ -9,12 +9,12 @@ import dataclasses
 from pathlib import Path
 
 import numpy as np
-import trimesh
 from jaxtyping import Float, Int
 
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import numbers
 from mjx_hand.files.npz_archive import open_archive
+from mjx_hand.objects.mesh_file import read_mesh
 
 _LAYOUT: dict[str, tuple[int | str, ...]] = {"object_pose_objcam": ("t", 3, 4), "hand_cam_to_object_cam": (4, 4)}
 _WORST = 1e6  # condition of a movement's matrix; with metres beside cosines it is below a hundred
@@ -72,11 +72,5 @@ def load_object(recording: str | Path, mesh: str | Path) -> RecordedObject:
     to_hand = np.linalg.inv(to_object)
     pose = np.einsum("ij,tjk->tik", to_hand[:3, :3], n["object_pose_objcam"].astype(float))
     pose[:, :, 3] += to_hand[:3, 3]
-    try:
-        surface = trimesh.load_mesh(mesh)
-        vertices, faces = np.asarray(surface.vertices, float), np.asarray(surface.faces, int)
-    except Exception as error:  # what a damaged file raises is the reader's affair
-        raise InputError(f"{mesh}: not a readable mesh ({type(error).__name__})") from None
-    if len(faces) == 0 or not np.isfinite(vertices).all():
-        raise InputError(f"{mesh}: holds no surface; give the object's mesh as .stl, in metres")
+    vertices, faces = read_mesh(mesh)
     return RecordedObject(rotation=pose[:, :, :3], position=pose[:, :, 3], vertices=vertices, faces=faces)

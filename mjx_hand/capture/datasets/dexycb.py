@@ -16,11 +16,11 @@ table's, that of the AprilTag on it (z up), as the dataset's own viewer does to 
 from pathlib import Path
 
 from mjx_hand.capture.datasets.calibration import betas, read_settings, transform
-from mjx_hand.capture.datasets.contents import read_contents
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
 from mjx_hand.capture.datasets.mano_motion import chosen_side, mano_motion, recorded, some, turns
 from mjx_hand.capture.datasets.subject import full_pose, subject_of
 from mjx_hand.files.checked_arrays import numbers
+from mjx_hand.files.contents import read_contents
 from mjx_hand.motion import Motion
 
 FPS = 30.0

@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from mjx_hand.capture.datasets.contents import plain, unwrapped
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import numbers
+from mjx_hand.files.contents import plain, unwrapped
 
 Array = np.ndarray
 _PARAMETERS = ("global_orient", "hand_pose", "betas")

@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from mjx_hand.capture.datasets.contents import plain, unwrapped
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
 from mjx_hand.capture.datasets.mano_motion import chosen_side, mano_motion, recorded, turns
 from mjx_hand.capture.datasets.subject import full_pose, subject_of
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import numbers
+from mjx_hand.files.contents import plain, unwrapped
 from mjx_hand.hand.mano_file import MANO_VERTICES
 from mjx_hand.motion import Motion
 

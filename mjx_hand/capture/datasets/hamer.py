@@ -27,13 +27,13 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mjx_hand.capture.datasets.contents import PICKLES, WHOLE, read_contents, unwrapped
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
 from mjx_hand.capture.datasets.estimated_hands import EstimatedHand, hands_in, is_entry, is_list_of_hands
 from mjx_hand.capture.datasets.joint_places import subject_with_joints
 from mjx_hand.capture.datasets.mano_motion import LONGEST, chosen_side, frame_rate, mano_motion, recorded, some
 from mjx_hand.capture.datasets.subject import one_shape, subject_of
 from mjx_hand.errors import InputError
+from mjx_hand.files.contents import PICKLES, WHOLE, read_contents, unwrapped
 from mjx_hand.motion import Motion
 
 

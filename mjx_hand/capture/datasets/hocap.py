@@ -16,12 +16,12 @@ table's frame, that of `tag_1`. 30 frames per second. `poses_o.npy`, the objects
 from pathlib import Path
 
 from mjx_hand.capture.datasets.calibration import betas, read_settings
-from mjx_hand.capture.datasets.contents import WHOLE, plain, read_contents
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
 from mjx_hand.capture.datasets.mano_motion import chosen_side, mano_motion, recorded, some, turns
 from mjx_hand.capture.datasets.subject import full_pose, subject_of
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import numbers
+from mjx_hand.files.contents import WHOLE, plain, read_contents
 from mjx_hand.motion import Motion
 
 FPS = 30.0

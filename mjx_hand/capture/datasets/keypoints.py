@@ -1,4 +1,4 @@
-"""Hand keypoints (MediaPipe, Leap, WebXR, OpenXR, ARKit, Quest), fitted with a hand as they are read.
+"""Hand keypoints (MediaPipe, Leap, WebXR, OpenXR, ARKit, MRTK, Quest), fitted with a hand as they are read.
 
 The open hand, or the licensed one that is asked for, takes its shape from the bone lengths. `mjx-hand keypoints` makes
 the same motion and also filters, and reports how far it is from the keypoints.
@@ -15,9 +15,7 @@ from mjx_hand.motion import Motion
 
 
 def _recognises(path: Path, contents: Contents) -> bool:
-    if not path.is_file():
-        return False
-    return recognised(path, contents if path.suffix.lower() == ".npz" else keypoint_contents(path)) is not None
+    return path.is_file() and recognised(path, keypoint_contents(path, contents)) is not None
 
 
 def _read(path: Path, contents: Contents, request: Request) -> Motion:
@@ -27,5 +25,5 @@ def _read(path: Path, contents: Contents, request: Request) -> Motion:
 
 
 FORMAT = DatasetFormat(
-    name="hand keypoints (.json, .npz, .csv)", recognises=_recognises, read=_read, has_sequences=True
+    name="hand keypoints (.json, .csv, .npz, .npy, .pkl)", recognises=_recognises, read=_read, has_sequences=True
 )

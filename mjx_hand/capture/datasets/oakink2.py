@@ -19,12 +19,12 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from mjx_hand.capture.datasets.contents import plain
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
 from mjx_hand.capture.datasets.mano_motion import LONGEST, chosen_side, mano_motion, recorded, some
 from mjx_hand.capture.datasets.subject import one_shape, subject_of
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import numbers
+from mjx_hand.files.contents import plain
 from mjx_hand.motion import Motion
 
 CAPTURE_FPS = 120.0

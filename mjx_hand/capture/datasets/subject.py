@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float
 
-from mjx_hand.capture.datasets.contents import plain, read_contents
 from mjx_hand.capture.datasets.dataset_format import Request
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import numbers
+from mjx_hand.files.contents import plain, read_contents
 from mjx_hand.hand.joints import PARENTS, TIP_LINKS
 from mjx_hand.hand.load import load_hand
 from mjx_hand.hand.mano_file import load_mano_file

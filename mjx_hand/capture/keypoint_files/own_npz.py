@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from mjx_hand.capture.keypoint_files.reader import KeypointReader
+from mjx_hand.capture.keypoint_files.reader import ARRAYS, KeypointReader
 from mjx_hand.capture.keypoints.recording import SCHEMA, KeypointRecording, load_keypoint_file
 from mjx_hand.errors import InputError
 
@@ -19,4 +19,6 @@ def _read(path: Path, arrays: Any, unit: str | None) -> dict[str, KeypointRecord
     return {recording.side or "hand": recording}
 
 
-READER = KeypointReader(name=f"mjx-hand keypoints (schema {SCHEMA})", suffix=".npz", recognises=_recognises, read=_read)
+READER = KeypointReader(
+    name=f"mjx-hand keypoints (schema {SCHEMA})", container=ARRAYS, recognises=_recognises, read=_read
+)

@@ -6,7 +6,17 @@ from pathlib import Path
 from typing import Any
 
 from mjx_hand.capture.keypoints.recording import KeypointRecording
+from mjx_hand.files.contents import PICKLES
+from mjx_hand.files.json_text import SUFFIXES
 from mjx_hand.plugins import plugins
+
+# What a file's suffix makes of its contents.
+ARRAYS, VALUE, TABLE = "arrays", "value", "table"
+CONTAINERS = {
+    ARRAYS: (".npz", ".npy", *PICKLES),
+    VALUE: SUFFIXES,
+    TABLE: (".csv", ".tsv", ".txt"),
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -15,14 +25,15 @@ class KeypointReader:
 
     Attributes:
         name: one line for people: what the form is called and what marks it.
-        suffix: of its files.
-        recognises: whether contents are of this form: an `.npz`'s arrays, a `.json`'s value, a `.csv`'s lines.
+        container: `ARRAYS`: the named values of an `.npz`, `.npy` or pickle; `VALUE`: that of a `.json` and its like;
+            `TABLE`: a `files.delimited.Table`.
+        recognises: whether contents are of this form.
         read: from path, contents and the unit that the caller says (or None) to a recording for each hand in it, by
             the hand's name in the file; raises InputError where the file is of the form but not sound.
     """
 
     name: str
-    suffix: str
+    container: str
     recognises: Callable[[Any], bool]
     read: Callable[[Path, Any, str | None], dict[str, KeypointRecording]]
 

@@ -10,6 +10,7 @@ from mjx_hand.capture.keypoint_fit.rotations import joint_rotations_along
 from mjx_hand.capture.keypoint_fit.smooth import fill_short_gaps, low_pass_keypoints
 from mjx_hand.capture.keypoints.bone_lengths import NUM_FINGER_BONES, median_lengths, shape_of_lengths
 from mjx_hand.capture.keypoints.layouts import KEYPOINTS, PALM
+from mjx_hand.capture.keypoints.plausible import keypoint_findings
 from mjx_hand.capture.keypoints.recording import KeypointRecording, check_keypoints
 from mjx_hand.capture.keypoints.size import check_size
 from mjx_hand.capture.keypoints.skeleton import (
@@ -25,9 +26,13 @@ from mjx_hand.errors import InputError
 from mjx_hand.hand.model import HandModel
 from mjx_hand.motion import Motion, check_motion
 from mjx_hand.motion.gaps import fill_lines, fill_turns
+from mjx_hand.motion.plausibility.motions import plausible_motion
+from mjx_hand.motion.plausibility.points import residual_findings
 from mjx_hand.motion.resample import matrix_quaternions, quaternion_matrices
 
 Array = np.ndarray
+
+_MIDDLE_TIP = KEYPOINTS.index("middle_tip")
 
 
 @dataclass(frozen=True)
@@ -62,18 +67,18 @@ def fit_keypoints(
         settings: how.
 
     Returns:
-        The motion and a report on it. Frames with a long gap in any finger or the palm are not valid: their wrist is
-        interpolated and their rotations are the identity.
+        The motion, with a warning for what is doubtful about it, and a report on it. Frames with a long gap in any
+        finger or the palm are not valid: their wrist is interpolated and their rotations are the identity.
 
     Raises:
         InputError: the recording's rate is not known, keypoints are never seen, no frame shows the whole hand, or its
-            size is no hand's.
+            size or anything else (`motion.plausibility`) is no hand's.
     """
     settings = settings or KeypointSettings()
     check_keypoints(recording)
     name = recording.source or "keypoints"
     if recording.fps is None:
-        raise InputError(f"{name}: does not say its frame rate; give fps")
+        raise InputError(f"{name}: does not say its frame rate; give fps, as in fps=30")
     never = [KEYPOINTS[k] for k in np.flatnonzero(~np.isfinite(recording.positions).any(axis=(0, 2))) if k > 0]
     if never:
         raise InputError(f"{name}: {', '.join(never)} never seen; every finger joint and tip is needed")
@@ -104,9 +109,23 @@ def fit_keypoints(
         tip_offset=rest.tip_offset if settings.own_bones else None,
         side=hand.side,
         source=f"{hand.name} fitted to {recording.source or 'keypoints'}",
+        warnings=recording.warnings,
     )
     fitted = posed_keypoints(rest, rotations, quaternion_matrices(motion.wrist_quaternion), motion.wrist_position)
-    return check_motion(motion), make_report(recording.positions, fitted, valid)
+    report = make_report(recording.positions, fitted, valid)
+    size = float(np.linalg.norm(rest.keypoints[_MIDDLE_TIP]))
+    found = [
+        *keypoint_findings(recording, hand),
+        *residual_findings(_residual(recording.positions[valid], report.fitted[valid]), size),
+    ]
+    return plausible_motion(check_motion(motion), *found, name=name), report
+
+
+def _residual(seen: Float[Array, "t 21 3"], fitted: Float[Array, "t 21 3"]) -> float:
+    """The mean distance (m) of the keypoints that are seen, in the middle of the frames."""
+    distance = np.linalg.norm(fitted - seen, axis=-1)
+    known = np.isfinite(distance)
+    return float(np.median(np.where(known, distance, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)))
 
 
 def _wrist(

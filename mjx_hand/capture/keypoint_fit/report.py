@@ -63,4 +63,6 @@ def make_report(
 
 
 def _jitter(positions: Float[Array, "t 21 3"]) -> float:
+    if len(positions) < 3:
+        return float("nan")
     return float(np.nanmean(np.linalg.norm(np.diff(positions, n=2, axis=0), axis=-1)))

@@ -1,12 +1,14 @@
 """Bone lengths from keypoints, and the hand shape that has them."""
 
 import warnings
+from functools import cache
 
 import numpy as np
 from jaxtyping import Float
 
 from mjx_hand.capture.keypoints.layouts import KEYPOINTS
 from mjx_hand.capture.keypoints.skeleton import BONES, rest_keypoints
+from mjx_hand.hand.load import load_hand
 from mjx_hand.hand.model import HandModel
 
 _PALM = (
@@ -34,6 +36,12 @@ def median_lengths(positions: Float[np.ndarray, "t 21 3"]) -> Float[np.ndarray, 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # all NaN, as documented
         return np.nanmedian(lengths(positions), axis=0)
+
+
+@cache
+def mean_lengths() -> Float[np.ndarray, "n"]:
+    """The `lengths` (m) of the open hand's mean shape."""
+    return lengths(rest_keypoints(load_hand())[0])
 
 
 def shape_of_lengths(hand: HandModel, observed: Float[np.ndarray, "n"]) -> Float[np.ndarray, "s"]:

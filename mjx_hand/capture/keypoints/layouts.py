@@ -124,6 +124,18 @@ _QUEST = (
     *(f"Hand_Pinky{k}" for k in (0, 1, 2, 3)),
     *(f"Hand_{d}Tip" for d in ("Thumb", "Index", "Middle", "Ring", "Pinky")),
 )
+_MRTK = (
+    *("Palm", "Wrist"),
+    *("ThumbMetacarpalJoint", "ThumbProximalJoint", "ThumbDistalJoint", "ThumbTip"),
+    *(
+        f"{d}{joint}"
+        for d in ("Index", "Middle", "Ring", "Pinky")
+        for joint in ("Metacarpal", "Knuckle", "MiddleJoint", "DistalJoint", "Tip")
+    ),
+)
+_METACARPALS = ("IndexMetacarpal", "MiddleMetacarpal", "RingMetacarpal", "PinkyMetacarpal")
+_MANO = ("wrist", *(f"{finger}{k}" for finger in FINGERS for k in (1, 2, 3)))
+_MANO_DIGITS = tuple(f"{finger}{k}" if k < 4 else f"{finger}_tip" for finger in _MANO_FINGERS for k in (1, 2, 3, 4))
 
 
 def _without(names: tuple[str, ...], *parts: str) -> tuple[str, ...]:
@@ -132,7 +144,8 @@ def _without(names: tuple[str, ...], *parts: str) -> tuple[str, ...]:
 
 # Leap's thumb has no metacarpal of its own: its "mcp" is the joint that anatomy calls CMC. In the XR layouts a joint is
 # named after the bone that begins there, so a "proximal" is an MCP and the thumb's "metacarpal" its CMC; a finger's
-# metacarpal begins in the palm and is not among the 21. Quest's Thumb0 is the trapezium, below the CMC.
+# metacarpal begins in the palm and is not among the 21. Quest's Thumb0 is the trapezium, below the CMC. MANO's joints
+# are its 16 links, the tips behind them in one of two orders: SMPL-X's and manopth's, or the links' own.
 LAYOUTS: dict[str, KeypointLayout] = {
     layout.name: layout
     for layout in (
@@ -145,6 +158,9 @@ LAYOUTS: dict[str, KeypointLayout] = {
             "openxr", _OPENXR, ("wrist", "thumb_metacarpal", *_without(_OPENXR, "palm", "wrist", "_metacarpal"))
         ),
         KeypointLayout("arkit", _ARKIT, _without(_ARKIT, "Metacarpal", "forearm")),
+        KeypointLayout("mrtk", _MRTK, _without(_MRTK, "Palm", *_METACARPALS)),
+        KeypointLayout("mano", (*_MANO, *(f"{d}_tip" for d in _MANO_FINGERS)), ("wrist", *_MANO_DIGITS)),
+        KeypointLayout("mano_index_first", (*_MANO, *(f"{d}_tip" for d in FINGERS)), ("wrist", *_MANO_DIGITS)),
         KeypointLayout(
             "quest",
             _QUEST,

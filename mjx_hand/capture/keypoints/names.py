@@ -2,24 +2,32 @@
 
 import re
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float
 
-from mjx_hand.capture.keypoints.layouts import LAYOUTS, KeypointLayout, to_keypoints
+from mjx_hand.capture.keypoints.layouts import LAYOUTS, NUM_KEYPOINTS, KeypointLayout, to_keypoints
+from mjx_hand.capture.keypoints.orders import order_of
 from mjx_hand.errors import InputError
 
-# Bare arrays: how many points tell the layout. Leap's 26 with carpal ends must name itself.
-_COUNTS = {len(layout.joints): layout for name, layout in reversed(LAYOUTS.items()) if name != "leap_bones"}
+# Bare arrays: how many points tell the layout, of 21 the bones. Leap's 26 with carpal ends must name itself.
+COUNTS = {len(layout.joints): layout for name, layout in reversed(LAYOUTS.items()) if name != "leap_bones"}
 
 _ENOUGH = 10  # joints of one layout by which a hand is recognised, even where some are missing
 
 
+@lru_cache(maxsize=4096)
 def plain(name: str) -> str:
     """What devices' names of a joint share: of `XR_HAND_JOINT_INDEX_TIP_EXT` and `index-finger-tip` "indextip"."""
     letters = re.sub(r"[^a-z0-9]", "", name.lower())
     letters = re.sub(r"^(xrhandjoint|xrhand|hand)|ext$|finger|phalanx", "", letters)
     return letters.replace("pinky", "little")
+
+
+@lru_cache
+def _plain_joints(layout: KeypointLayout) -> frozenset[str]:
+    return frozenset(plain(name) for name in layout.joints)
 
 
 def layout_named(names: Sequence[str]) -> KeypointLayout | None:
@@ -34,7 +42,7 @@ def layout_named(names: Sequence[str]) -> KeypointLayout | None:
 def names_a_hand(names: Sequence[str]) -> bool:
     """Whether these are joints of a hand: of one layout enough that nothing else would have them all."""
     given = {plain(name) for name in names}
-    return any(len(given & {plain(name) for name in layout.joints}) >= _ENOUGH for layout in LAYOUTS.values())
+    return len(given) >= _ENOUGH and any(len(given & _plain_joints(known)) >= _ENOUGH for known in LAYOUTS.values())
 
 
 def named_keypoints(
@@ -50,7 +58,7 @@ def named_keypoints(
     layout = layout_named(names)
     given = [plain(name) for name in names]
     if layout is None:
-        nearest = max(LAYOUTS.values(), key=lambda known: len({plain(n) for n in known.joints} & set(given)))
+        nearest = max(LAYOUTS.values(), key=lambda known: len(_plain_joints(known) & set(given)))
         wanted = [name for name in nearest.keypoints if name is not None and plain(name) not in given]
         if len(wanted) == sum(name is not None for name in nearest.keypoints):
             raise InputError(
@@ -66,18 +74,21 @@ def named_keypoints(
 
 
 def counted_keypoints(
-    path: object, points: Float[np.ndarray, "*b n 3"], layout: str | None = None
+    path: object, points: Float[np.ndarray, "*b n 3"], layout: object = None
 ) -> tuple[Float[np.ndarray, "*b 21 3"], str]:
-    """The 21 keypoints among points without names, and the layout's name: as said, or as their number tells.
+    """The 21 keypoints among points without names, and the layout's name: as said, or as number and bones tell.
 
     Raises:
         InputError: the layout is unknown or has another number of points.
     """
     count = points.shape[-2]
-    if layout is not None and layout not in LAYOUTS:
-        raise InputError(f"{path}: layout is {layout!r}; known: {', '.join(LAYOUTS)}")
-    known = LAYOUTS[layout] if layout is not None else _COUNTS.get(count)
+    if layout is not None and (not isinstance(layout, str) or layout not in LAYOUTS):
+        raise InputError(f"{path}: layout is {str(layout)[:40]!r}; known: {', '.join(LAYOUTS)}")
+    known = LAYOUTS[layout] if layout is not None else COUNTS.get(count)
+    if layout is None and count == NUM_KEYPOINTS:
+        known = order_of(points)
     if known is None or len(known.joints) != count:
         counts = ", ".join(f"{name} {len(each.joints)}" for name, each in LAYOUTS.items())
-        raise InputError(f"{path}: has {count} points per hand; known layouts: {counts}")
+        lack = "; MANO's 16 joints lack the finger tips, which are needed too" if count == 16 else ""
+        raise InputError(f"{path}: has {count} points per hand; known layouts: {counts}{lack}")
     return to_keypoints(points, known), known.name

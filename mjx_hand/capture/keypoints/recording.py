@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from mjx_hand.capture.keypoints.layouts import KEYPOINTS, NUM_KEYPOINTS
 from mjx_hand.errors import InputError
-from mjx_hand.files.checked_arrays import numbers, text, texts
+from mjx_hand.files.checked_arrays import Lines, numbers, text, texts
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 from mjx_hand.pytree import pytree, static
 
@@ -25,6 +25,7 @@ class KeypointRecording:
         side: "right", "left", or "" where the recording does not say.
         layout: name of the device's layout in `layouts.LAYOUTS`.
         source: provenance, one line.
+        warnings: what is doubtful about it, one line each.
     """
 
     fps: float | None
@@ -32,6 +33,7 @@ class KeypointRecording:
     side: str = static(default="")
     layout: str = static(default="mediapipe")
     source: str = static(default="")
+    warnings: Lines = static(default=())
 
     @property
     def num_frames(self) -> int:
@@ -68,8 +70,8 @@ def save_keypoints(recording: KeypointRecording, path: str | Path) -> None:
     """
     check_keypoints(recording)
     if recording.fps is None:
-        raise InputError(f"{recording.source or 'keypoints'}: the frame rate is not known; give fps")
-    arrays = {
+        raise InputError(f"{recording.source or 'keypoints'}: the frame rate is not known; give fps, as in fps=30")
+    arrays: dict[str, np.ndarray | float | str] = {
         "fps": recording.fps,
         "positions": recording.positions,
         "names": np.array(KEYPOINTS),
@@ -77,6 +79,8 @@ def save_keypoints(recording: KeypointRecording, path: str | Path) -> None:
         "layout": recording.layout,
         "source": recording.source,
     }
+    if recording.warnings:
+        arrays["warnings"] = np.array(recording.warnings)
     save_arrays(path, SCHEMA, arrays)
 
 
@@ -97,5 +101,6 @@ def load_keypoint_file(path: str | Path) -> KeypointRecording:
             side=text(path, a, "side"),
             layout=text(path, a, "layout"),
             source=text(path, a, "source"),
+            warnings=texts(path, a, "warnings", needed=False),
         )
     )

@@ -11,6 +11,7 @@ from mjx_hand.capture.keypoints.skeleton import bone_directions
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import FINGERS
 
+_LEFT_HANDED = ("quest", "mrtk")  # layouts of Unity's packages
 LEAST_BEND = np.deg2rad(3.0)  # mean bend (rad) below which a hand is too flat to tell
 _FOUR = [k for k, finger in enumerate(FINGERS) if finger != "thumb"]  # a thumb also bends across the palm
 _INDEX, _LITTLE = KEYPOINTS.index("index_mcp"), KEYPOINTS.index("little_mcp")
@@ -22,15 +23,28 @@ def bend_towards_right(positions: Float[np.ndarray, "t 21 3"]) -> float:
     Seen along the knuckles from the little finger to the index finger, a right hand's fingers close
     counterclockwise and a left hand's clockwise: negative for a left hand, near zero for one held flat.
     """
+    return float(_mean(_outer_bends(positions).reshape(1, -1))[0])
+
+
+def bends_towards_right(positions: Float[np.ndarray, "t 21 3"]) -> Float[np.ndarray, "t"]:
+    """`bend_towards_right` of each frame by itself."""
+    return _mean(_outer_bends(positions).reshape(len(positions), -1))
+
+
+def _outer_bends(positions: Float[np.ndarray, "t 21 3"]) -> Float[np.ndarray, "t 4 2"]:
     bones = bone_directions(positions)[:, _FOUR]
     across = positions[:, _INDEX] - positions[:, _LITTLE]
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore"):
         across = across / np.linalg.norm(across, axis=-1, keepdims=True)
     sine = (np.cross(bones[:, :, :-1], bones[:, :, 1:]) * across[:, None, None]).sum(axis=-1)
     cosine = (bones[:, :, :-1] * bones[:, :, 1:]).sum(axis=-1)
+    return np.arctan2(sine, cosine)
+
+
+def _mean(values: Float[np.ndarray, "t n"]) -> Float[np.ndarray, "t"]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # the mean of nothing is NaN, as documented
-        return float(np.nanmean(np.arctan2(sine, cosine)))
+        return np.asarray(np.nanmean(values, axis=-1))
 
 
 def bent_side(positions: Float[np.ndarray, "t 21 3"]) -> str:
@@ -59,7 +73,13 @@ def known_side(recording: KeypointRecording, asked: str | None = None) -> tuple[
         )
     if not (said or seen):
         raise InputError(
-            f"{name}: does not say which hand it is, and holds it too flat to tell; give side='right' or 'left'"
+            f"{name}: does not say which hand it is, and holds it too flat to tell; give side='right' or side='left'"
         )
-    how = "as asked" if asked else "as recorded" if recording.side else "as its fingers bend"
-    return said or seen, how
+    if said:
+        return said, "as asked" if asked else "as recorded"
+    # A hand in left-handed axes is the other hand's mirror image in every way: nothing in it would tell.
+    if recording.layout in _LEFT_HANDED:
+        how = f"as its fingers bend in right-handed axes; in Unity's, as {recording.layout} often has, it is the other"
+    else:
+        how = "as its fingers bend"
+    return seen, how

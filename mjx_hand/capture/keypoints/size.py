@@ -9,6 +9,12 @@ from mjx_hand.errors import InputError
 from mjx_hand.hand.model import HandModel
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}  # metres in each
+_UNIT_WORDS = {
+    f"{prefix}{word}{s}": f"{short}m"
+    for prefix, short in (("", ""), ("centi", "c"), ("milli", "m"))
+    for word in ("metre", "meter")
+    for s in ("", "s")
+}
 BIGGEST = 1.8  # times the mean hand, or the other way its share; small children's hands are half an adult's
 
 
@@ -18,9 +24,10 @@ def unit_factor(name: str, unit: object) -> float:
     Raises:
         InputError: the unit is unknown; `name` says where it stands.
     """
-    if not isinstance(unit, str) or unit not in UNITS:
-        raise InputError(f"{name}: unit is {unit!r}; known: {', '.join(UNITS)}")
-    return UNITS[unit]
+    known = _UNIT_WORDS.get(unit.lower().strip(), unit.lower().strip()) if isinstance(unit, str) else None
+    if known not in UNITS:
+        raise InputError(f"{name}: unit is {repr(unit)[:60]}; known: {', '.join(UNITS)}")
+    return UNITS[known]
 
 
 def check_size(name: str, hand: HandModel, observed: Float[np.ndarray, "n"]) -> None:
@@ -38,7 +45,8 @@ def check_size(name: str, hand: HandModel, observed: Float[np.ndarray, "n"]) -> 
     for unit, metres in UNITS.items():
         if unit != "m" and 1 / BIGGEST < ratio * metres < BIGGEST:
             raise InputError(
-                f"{name}: a hand about {1 / metres:.0f} times too big, so positions are in {unit}; say unit={unit!r}"
+                f"{name}: a hand about {1 / metres:.0f} times too big, so positions are in {unit}; say "
+                f"unit={unit!r} to mjx-hand keypoints"
             )
     what = f"{ratio:.3g} times too big" if ratio > 1 else f"{1 / ratio:.3g} times too small"
     raise InputError(

@@ -11,9 +11,9 @@ import numpy as np
 from jaxtyping import Float
 
 from mjx_hand.capture.marker_files.c3d_header import LONG, C3DHeader, read_header
-from mjx_hand.capture.marker_files.c3d_parameters import Parameters, read_parameters
+from mjx_hand.capture.marker_files.c3d_parameters import BLOCK, Parameters, read_parameters
 from mjx_hand.capture.marker_files.marker_format import MarkerFormat
-from mjx_hand.capture.marker_files.samples import recording_of
+from mjx_hand.capture.marker_files.samples import recording_of, timeline_at
 from mjx_hand.capture.markers.marker_recording import MarkerRecording
 from mjx_hand.errors import InputError
 
@@ -37,21 +37,52 @@ def screen_axes(path: Path, right: str, up: str) -> Float[np.ndarray, "3 3"]:
 
 
 def number_of_frames(header: C3DHeader, parameters: Parameters, content: bytes) -> int:
-    """The frames that the file promises; for long recordings that promise none, those that are there."""
+    """The frames that are there: of the numbers that the file says the first that its length confirms.
+
+    Files that were cropped or joined keep parameters of before, and headers have no room for long recordings. Where the
+    length confirms none, the header's counts, which then promises more than there is, or is followed by other data.
+    """
     trial, point = parameters.get("TRIAL", {}), parameters.get("POINT", {})
     first, last = (_long(trial.get(f"ACTUAL_{end}_FIELD", [])) for end in ("START", "END"))
-    if first and last and last >= first:
-        return last - first + 1
-    if header.frames is not None:
-        return header.frames
-    said = (point.get("LONG_FRAMES") or point.get("FRAMES") or [-1])[0]
-    if said > LONG:
-        return int(said)
+    said = list(header.frames)
+    said += [last - first + 1] if first and last >= first else []
+    said += [int(point[name][0]) for name in ("LONG_FRAMES", "FRAMES") if _is_count(point.get(name))]
     size = max(header.frame_bytes, 1)
-    frames = (len(content) - header.data) // size
+    there = len(content) - header.data
+    # What is after the last frame fills up its block.
+    confirmed = [frames for frames in said if 0 <= there - frames * size < BLOCK]
+    long = [frames for frames in said if frames > LONG]
+    if confirmed or header.frames or long:
+        return [*confirmed, *header.frames, *long][0]
+    frames = there // size
     while frames and not any(content[header.data + (frames - 1) * size : header.data + frames * size]):
         frames -= 1  # the last block is filled up with zeros
     return frames
+
+
+def _is_count(value: list | None) -> bool:
+    return bool(value) and not isinstance(value[0], str) and bool(np.isfinite(value[0])) and value[0] > 0
+
+
+def frame_rate(header: C3DHeader, parameters: Parameters) -> tuple[float | None, tuple[str, ...]]:
+    """Frames per second: POINT:RATE's, else the header's; and a note where the two differ.
+
+    Then the one counts that the analog rate confirms, else POINT:RATE, as the manual has it.
+    """
+    point, analog = (
+        float(value[0]) if _is_count(value := parameters.get(group, {}).get("RATE")) else 0.0
+        for group in ("POINT", "ANALOG")
+    )
+    rates = [rate for rate in (point, header.rate) if rate]
+    if len(rates) < 2 or _same(*rates):
+        return (rates[0] if rates else None), ()
+    by_analog = analog / header.samples if header.samples else 0.0
+    rate = next((rate for rate in rates if _same(rate, by_analog)), point)
+    return rate, (f"POINT:RATE is {point:g} and the header's rate {header.rate:g}; {rate:g} frames/s is taken",)
+
+
+def _same(a: float, b: float) -> bool:
+    return abs(a - b) <= 0.02 * a
 
 
 def _long(words: list) -> int:
@@ -76,7 +107,7 @@ def points_of(path: Path, content: bytes, header: C3DHeader, frames: int) -> Flo
     return np.where(points[..., 3:] < 0, np.nan, points[..., :3])
 
 
-def _read(path: Path, units: str | None) -> MarkerRecording:
+def _read(path: Path, units: str | None, fps: float | None) -> MarkerRecording:
     content = path.read_bytes()
     header = read_header(path, content)
     try:
@@ -84,14 +115,14 @@ def _read(path: Path, units: str | None) -> MarkerRecording:
     except ValueError as error:
         raise InputError(f"{path}: damaged C3D parameters ({error}); export it again") from None
     point = parameters.get("POINT", {})
-    # More labels than 255 go on in LABELS2 and so forth.
-    names = [name for key in sorted(k for k in point if k.startswith("LABELS")) for name in point[key]][: header.points]
-    if len(names) != header.points or not all(isinstance(name, str) and name for name in names):
-        raise InputError(f"{path}: {len(names)} labels for {header.points} points; label all trajectories")
+    # More labels than 255 go on in LABELS2 and so forth. Calculated points may have none.
+    names = [name for key in sorted(k for k in point if k.startswith("LABELS")) for name in point[key]]
+    names = [name if isinstance(name, str) else "" for name in [*names, *[""] * header.points][: header.points]]
     positions = points_of(path, content, header, number_of_frames(header, parameters, content))
     right, up, unit = (str((point.get(name) or [""])[0]) for name in ("X_SCREEN", "Y_SCREEN", "UNITS"))
-    fps = float((point.get("RATE") or [np.nan])[0])
-    return recording_of(path, names, positions @ screen_axes(path, right, up).T, fps, units or unit or "mm")
+    stated, notes = frame_rate(header, parameters)
+    timeline = timeline_at(path, len(positions), stated, fps)
+    return recording_of(path, names, positions @ screen_axes(path, right, up).T, timeline, units or unit or "mm", notes)
 
 
 FORMAT = MarkerFormat(name="C3D (.c3d)", suffixes=(".c3d",), read=_read)

@@ -4,10 +4,13 @@ import struct
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from mjx_hand.capture.marker_files.c3d_parameters import BLOCK, PROCESSORS, Numbers
 from mjx_hand.errors import InputError
 
 LONG = 0xFFFF  # the last frame that the header can name; longer recordings say theirs in a parameter
+MOST = 1e5  # frames per second; a header that says more says nothing
 # Points, analog values per frame, first and last frame, gap, scale, block of the data, analog samples per point frame.
 _WORDS = "HHHHHfHH"
 
@@ -20,7 +23,9 @@ class C3DHeader:
         numbers: how the file writes numbers.
         points: number of points.
         analog: number of analog values in a frame.
-        frames: number of frames; None where the header has no room for it.
+        frames: numbers of frames that it may mean, the likeliest first; none where it has no room for them.
+        rate: frames per second; 0 where it says none.
+        samples: analog samples in a frame, of each channel.
         scale: of integer coordinates; negative where coordinates are floating point.
         parameters, data: offsets in bytes of the two sections.
     """
@@ -28,8 +33,10 @@ class C3DHeader:
     numbers: Numbers
     points: int
     analog: int
-    frames: int | None
+    frames: tuple[int, ...]
     scale: float
+    rate: float
+    samples: int
     parameters: int
     data: int
 
@@ -53,7 +60,7 @@ def read_header(path: Path, content: bytes) -> C3DHeader:
             f"{path}: processor type {processor} in the C3D file, valid are 84, 85, 86; it is damaged, export it again"
         )
     numbers = PROCESSORS[processor]
-    points, analog, first, last, _, scale, start, _ = _words(content, numbers)
+    points, analog, first, last, _, scale, start, samples = _words(content, numbers)
     if not _plausible(points, first, last, scale, start):
         other = PROCESSORS[84 if numbers.order == ">" else 86]
         swapped = _words(content, other)
@@ -66,11 +73,19 @@ def read_header(path: Path, content: bytes) -> C3DHeader:
         numbers=numbers,
         points=points,
         analog=analog,
-        frames=None if last == LONG else last - first + 1,
+        # Frames count from 1; of those that count from 0 some files name the last, and some how many there are.
+        frames=() if last == LONG else (last - first + 1, last)[: 1 if first else 2],
         scale=scale,
+        rate=_rate(numbers, content),
+        samples=samples,
         parameters=parameters,
         data=(start - 1) * BLOCK,
     )
+
+
+def _rate(numbers: Numbers, content: bytes) -> float:
+    rate = float(numbers.floats(content[20:24])[0])
+    return rate if np.isfinite(rate) and 0 < rate < MOST else 0.0
 
 
 def _words(content: bytes, numbers: Numbers) -> tuple:
@@ -81,4 +96,4 @@ def _words(content: bytes, numbers: Numbers) -> tuple:
 
 def _plausible(points: int, first: int, last: int, scale: float, start: int) -> bool:
     # Scale is a factor of about a tenth of a millimetre, or negative where the data are floating point.
-    return points < 10000 and 1 <= first <= last and 1e-7 < abs(scale) < 1e5 and 2 <= start < 1000
+    return points < 10000 and 0 <= first <= last and 1e-7 < abs(scale) < 1e5 and 2 <= start < 1000

@@ -15,13 +15,15 @@ class MarkerFormat:
     Attributes:
         name: one line for people: what the format is called and what marks it.
         suffixes: of its files, in lower case.
-        read: the recording in a file; the second argument is a unit to read it in instead of the file's own, or None.
-            Raises InputError where the file is not sound.
+        read: the recording in a file, from its path, a unit to read it in instead of the file's own (or None), and its
+            frames per second where it does not say them (or None). Raises InputError where the file is not sound.
+        begins: how its text begins, where formats share a suffix; one without is asked last.
     """
 
     name: str
     suffixes: tuple[str, ...]
-    read: Callable[[Path, str | None], MarkerRecording]
+    read: Callable[[Path, str | None, float | None], MarkerRecording]
+    begins: str = ""
 
 
 def marker_formats() -> list[MarkerFormat]:

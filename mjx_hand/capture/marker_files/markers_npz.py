@@ -7,10 +7,13 @@ from mjx_hand.capture.markers.marker_recording import SCHEMA, MarkerRecording, l
 from mjx_hand.errors import InputError
 
 
-def _read(path: Path, units: str | None) -> MarkerRecording:
+def _read(path: Path, units: str | None, fps: float | None) -> MarkerRecording:
     if units is not None:
         raise InputError(f"{path}: the project's own marker files are in metres; leave --units out")
-    return load_recording_file(path)
+    recording = load_recording_file(path)
+    if fps not in (None, recording.fps):
+        raise InputError(f"{path}: was recorded at {recording.fps:g} frames per second; leave out fps={fps:g}")
+    return recording
 
 
 FORMAT = MarkerFormat(name=f"mjx-hand markers (.npz, schema {SCHEMA})", suffixes=(".npz",), read=_read)

@@ -24,6 +24,8 @@ from mjx_hand.errors import InputError
 from mjx_hand.hand.model import HandModel
 from mjx_hand.motion.gaps import fill_lines, fill_turns
 from mjx_hand.motion.motion import Motion
+from mjx_hand.motion.plausibility.motions import plausible_motion
+from mjx_hand.motion.plausibility.points import residual_findings
 from mjx_hand.motion.resample import matrix_quaternions
 from mjx_hand.pytree import replace
 
@@ -171,7 +173,9 @@ def fit_many(
         motion = make_motion(track, jax.tree.map(lambda a, at=at: a[at], found.state), subject, hand)
         offsets = np.asarray(subject.offsets)
         report = make_report(track, found.residual[at], offsets, marker_set, settings.outlier, settings.max_distance)
-        out.append((motion, report))
+        residual = residual_findings(report.rms, float(np.ptp(np.asarray(hand.template), axis=0).max()))
+        name = track.recording.source or "recording"
+        out.append((plausible_motion(motion, *residual, name=name), report))
     return out
 
 
@@ -195,4 +199,5 @@ def make_motion(track: Track, state: PoseState, subject: Subject, hand: HandMode
         valid=valid,
         side=hand.side,
         source=f"{hand.name} fitted to {track.recording.source or 'a marker recording'}",
+        warnings=track.recording.warnings,
     )

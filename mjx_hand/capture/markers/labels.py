@@ -1,10 +1,10 @@
 """Which of a recording's labels are which markers of a set."""
 
-import re
 from dataclasses import dataclass
 
 import numpy as np
 
+from mjx_hand.capture.markers.label_patterns import matches
 from mjx_hand.capture.markers.marker_recording import MarkerRecording
 from mjx_hand.capture.markers.marker_set import MarkerSet
 from mjx_hand.errors import InputError
@@ -57,7 +57,8 @@ def match_labels(recording: MarkerRecording, marker_set: MarkerSet, prefix: str 
     chosen = {marker: labels[0] for marker, labels in found.items() if labels}
     if not chosen:
         raise InputError(f"{name}: {_no_match(recording.names, marker_set, prefix)}")
-    at = [recording.names.index(label) for label in chosen.values()]
+    place = {label: k for k, label in enumerate(recording.names)}
+    at = [place[label] for label in chosen.values()]
     picked = replace(
         recording, positions=recording.positions[:, at], visible=recording.visible[:, at], names=tuple(chosen)
     )
@@ -75,7 +76,7 @@ def marker_of(label: str, marker_set: MarkerSet) -> str | None:
         if label.lower() == marker.lower():
             return marker
     for marker, patterns in zip(marker_set.names, marker_set.labels, strict=False):
-        if any(re.fullmatch(pattern, label, re.IGNORECASE) for pattern in patterns):
+        if any(matches(pattern, label) for pattern in patterns):
             return marker
     return None
 

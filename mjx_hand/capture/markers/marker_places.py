@@ -1,6 +1,5 @@
 """Where a marker sits, said anatomically, so that one description fits every hand; and its YAML form."""
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -8,6 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from mjx_hand.capture.markers.label_patterns import check_pattern
 from mjx_hand.errors import InputError
 from mjx_hand.files.safe_yaml import parse_yaml, shown
 from mjx_hand.hand.joints import FINGERS, LINKS, TIP_LINKS
@@ -124,12 +124,7 @@ def parse_place(name: str, entry: Any, common: Mapping[str, Any], source: str) -
 def parse_labels(where: str, value: Any) -> tuple[str, ...]:
     """Regular expressions, checked."""
     words = value if isinstance(value, list) else [value]
-    for word in words:
-        try:
-            re.compile(word)
-        except (re.error, TypeError):
-            raise InputError(f"{where}: labels has {shown(word)}, not a regular expression; quote it") from None
-    return tuple(words)
+    return tuple(check_pattern(where, word) for word in words)
 
 
 def choice(where: str, key: str, value: Any, valid: tuple[str, ...]) -> str:

@@ -1,5 +1,6 @@
 """`MarkerRecording`: labelled optical markers over time, and its file."""
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -7,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from mjx_hand.errors import InputError
-from mjx_hand.files.checked_arrays import numbers, text, texts
+from mjx_hand.files.checked_arrays import Lines, numbers, text, texts
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 from mjx_hand.pytree import pytree, replace, static
 
@@ -24,6 +25,7 @@ class MarkerRecording:
         visible: whether the marker was seen in the frame.
         names: the markers' labels.
         source: provenance, one line.
+        warnings: what is doubtful about it, one line each.
     """
 
     fps: float
@@ -31,6 +33,7 @@ class MarkerRecording:
     visible: Bool[np.ndarray, "t m"]
     names: tuple[str, ...] = static()
     source: str = static(default="")
+    warnings: Lines = static(default=())
 
     @property
     def num_frames(self) -> int:
@@ -52,7 +55,7 @@ def check_recording(recording: MarkerRecording) -> MarkerRecording:
         found = np.shape(getattr(recording, field))
         if found != shape:
             raise InputError(f"{name}: {field} has shape {found}, expected {shape} for its {markers} names")
-    repeated = sorted({n for n in recording.names if recording.names.count(n) > 1})
+    repeated = sorted(name for name, count in Counter(recording.names).items() if count > 1)
     if repeated:
         raise InputError(f"{name}: marker names repeat: {', '.join(repeated)}; give each marker its own name")
     if not np.isfinite(recording.fps) or recording.fps <= 0:
@@ -112,6 +115,8 @@ def save_recording(recording: MarkerRecording, path: str | Path) -> None:
         "names": np.array(recording.names),
         "source": recording.source,
     }
+    if recording.warnings:
+        arrays["warnings"] = np.array(recording.warnings)
     save_arrays(path, SCHEMA, arrays)
 
 
@@ -130,5 +135,6 @@ def load_recording_file(path: str | Path) -> MarkerRecording:
             visible=n["visible"].astype(bool),
             names=texts(path, a, "names"),
             source=text(path, a, "source"),
+            warnings=texts(path, a, "warnings", needed=False),
         )
     )

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from mjx_hand.capture.keypoint_files.load_keypoints import load_keypoints
 from mjx_hand.capture.keypoints.layouts import LAYOUTS, KeypointLayout, from_keypoints
 from mjx_hand.capture.keypoints.recording import KeypointRecording, load_keypoint_file, save_keypoints
-from mjx_hand.capture.keypoints.times import evenly, in_seconds
 from mjx_hand.capture.load import load_motion
 from mjx_hand.errors import InputError
 from tests.capture.keypoints.grips import FPS, grip, keypoints_of
@@ -182,27 +181,6 @@ def test_any_layout_and_pose_comes_back_from_json(tmp_path, name, seed):
     np.testing.assert_allclose(found.positions, points, atol=1e-9)
 
 
-@pytest.mark.parametrize("unit", [1.0, 1e3, 1e6, 1e9])
-@pytest.mark.parametrize("fps", [2.0, 30.0, 240.0])
-def test_times_in_any_unit_give_the_rate(unit, fps):
-    times = 5.0 * unit + np.arange(50) / fps * unit
-    assert np.diff(in_seconds(times)) == pytest.approx(1 / fps)
-    rate, kept = evenly("file", times, np.zeros((50, 3)))
-    assert rate == pytest.approx(fps)
-    assert len(kept) == 50
-
-
-def test_uneven_times_are_interpolated_and_dropped_frames_left_open():
-    times = np.array([0.0, 0.1, 0.2, 0.33, 0.4, 0.5, 0.9, 1.0])
-    rate, values = evenly("file", times, times[:, None])
-    assert rate == pytest.approx(10.0)
-    assert np.isnan(values[6:9]).all()
-    kept = np.delete(np.arange(11), [6, 7, 8])
-    np.testing.assert_allclose(values[kept, 0], kept / 10, atol=1e-9)
-    with pytest.raises(InputError, match="frame 2's time is not after"):
-        evenly("file", np.array([0.0, 1.0, 1.0]), np.zeros((3, 1)))
-
-
 def refused(path: Path, **said: object) -> str:
     with pytest.raises(InputError) as caught:
         load_keypoints(path, **said)  # type: ignore[arg-type]
@@ -225,7 +203,9 @@ def test_bad_files_say_what_is_wrong_in_one_line(tmp_path):
     (tmp_path / "cut.json").write_text('{"frames": [[')
     assert "not a readable .json file" in refused(tmp_path / "cut.json")
     (tmp_path / "other.json").write_text('{"frames": [{"temperature": 3}]}')
-    assert "no keypoint file that is known" in refused(tmp_path / "other.json")
+    assert "no keypoint file that is known here, but an .json of frames (1 objects with temperature)" in refused(
+        tmp_path / "other.json"
+    )
     write_json(tmp_path / "ragged.json", [good[0].tolist(), good[1, :20].tolist()], fps=30)
     assert "frame 1 has 20 points where the first has 21" in refused(tmp_path / "ragged.json")
     lacking = [{k: v for k, v in named(LAYOUTS["webxr"], p, "list").items() if k != "thumb-tip"} for p in good]
@@ -253,12 +233,17 @@ def test_bad_files_say_what_is_wrong_in_one_line(tmp_path):
     assert "a frame's time is '12:00'" in refused(tmp_path / "clock.json")
 
 
-def test_several_hands_of_one_side_need_their_name(recordings):
+def test_a_hand_found_again_under_a_new_id_is_one_hand(recordings):
     path = recordings / "leap_motion" / "confidence-37fps.npz"
-    assert "holds 4 hands (right_28, left_29, right_30, right_31)" in refused(path)
-    assert "holds 3 right hands (right_28, right_30, right_31)" in refused(path, side="right")
+    assert "holds 2 hands (right_28+right_30+right_31, left_29)" in refused(path)
     assert "has no hand 'right_1'" in refused(path, sequence="right_1")
     assert load_keypoints(path, side="left").side == "left"
+    right = load_keypoints(path, side="right")
+    assert right.warnings == ("right_28 was lost and found again as right_30, right_31; they are taken as one",)
+    with np.load(path) as arrays:
+        seen = np.concatenate([arrays[f"right_{k}_frame"] for k in (28, 30, 31)])
+        length = arrays["t"][seen.max()] - arrays["t"][seen.min()]
+    assert (right.num_frames - 1) / (right.fps or 0) == pytest.approx(length, abs=0.05)
 
 
 def test_load_motion_passes_on_what_was_asked(recordings):

@@ -3,6 +3,7 @@
 import struct
 from pathlib import Path
 
+import ezc3d
 import numpy as np
 import pytest
 from hypothesis import given
@@ -113,3 +114,78 @@ def test_c3d_of_more_frames_than_its_header_can_count(tmp_path):
     recording = load_markers(write_c3d(tmp_path / "long.c3d", positions, ("p",)))
     assert recording.num_frames == 70000
     np.testing.assert_allclose(recording.positions[:, 0, 0], positions[:, 0, 0] / 1000)
+
+
+def stale(path: Path, frames: int, start: int, end: int) -> np.ndarray:
+    """A file of so many frames whose TRIAL group says others, as cropping and joining leave it."""
+    places = np.random.default_rng(frames).uniform(100, 900, (frames, 3, 3))
+    file = ezc3d.c3d()
+    for key, value in {"RATE": [100.0], "UNITS": ["mm"], "LABELS": ["a", "b", "c"]}.items():
+        file["parameters"]["POINT"][key]["value"] = value
+    file["data"]["points"] = np.concatenate([places.transpose(2, 1, 0), np.ones((1, 3, frames))])
+    file.add_parameter("TRIAL", "ACTUAL_START_FIELD", [start, 0])
+    file.add_parameter("TRIAL", "ACTUAL_END_FIELD", [end, 0])
+    file.write(str(path))
+    return places / 1e3
+
+
+@pytest.mark.parametrize(("frames", "start", "end"), [(240, 1, 480), (240, 241, 960), (480, 1, 240), (3, 1, 4)])
+def test_frames_are_those_of_the_file_not_of_before_it_was_cut(tmp_path, frames, start, end):
+    places = stale(tmp_path / "r.c3d", frames, start, end)
+    np.testing.assert_allclose(load_markers(tmp_path / "r.c3d").positions, places, rtol=1e-6)
+    content = (tmp_path / "r.c3d").read_bytes()
+    (tmp_path / "r.c3d").write_bytes(content[: len(content) - 512 * (1 + frames // 100)])
+    with pytest.raises(InputError, match="the file is truncated"):
+        load_markers(tmp_path / "r.c3d")
+
+
+@pytest.mark.parametrize(("first", "last"), [(0, 3), (0, 4), (1, 4), (0, 119), (0, 120)])
+def test_first_frame_zero(tmp_path, first, last):
+    """Some writers count from 0; of those some name the last frame, and some how many there are."""
+    frames = np.tile([[1, 2, 3, 0], [4, 5, 6, 0], [7, 8, 9, 0], [1, 1, 1, 0]], (30 if last > 100 else 1, 1))
+    content = bytearray(c3d_by_hand("<", -1.0, frames, 84, lambda v: struct.pack("<f", v)))
+    struct.pack_into("<HH", content, 6, first, last)
+    (tmp_path / "r.c3d").write_bytes(content + bytes(-len(content) % 512))
+    found = load_markers(tmp_path / "r.c3d")
+    assert found.num_frames in (len(frames), last - first + 1)
+    if len(frames) > 100:  # in a few frames the last block has room for one more
+        np.testing.assert_allclose(found.positions[:120, 0], frames[:, :3] / 1e3, rtol=1e-6)
+
+
+def without_rate(content: bytes, header: float) -> bytes:
+    changed = bytearray(content.replace(b"RATE", b"RATX"))
+    struct.pack_into("<f", changed, 20, header)
+    return bytes(changed)
+
+
+def test_the_rate_of_the_header_or_of_the_caller(tmp_path):
+    frames = np.array([[1, 2, 3, 0], [4, 5, 6, 0]])
+    whole = c3d_by_hand("<", -1.0, frames, 84, lambda v: struct.pack("<f", v))
+    path = tmp_path / "r.c3d"
+    path.write_bytes(without_rate(whole, 250.0))
+    assert (load_markers(path).fps, load_markers(path).warnings) == (250.0, ())
+    path.write_bytes(without_rate(whole, 0.0))
+    with pytest.raises(InputError, match=r"no frame rate.*--fps"):
+        load_markers(path)
+    assert load_markers(path, fps=60.0).fps == 60.0
+    changed = bytearray(whole)
+    struct.pack_into("<f", changed, 20, 250.0)
+    path.write_bytes(changed)
+    found = load_markers(path)
+    assert found.fps == 100.0
+    assert "POINT:RATE is 100 and the header's rate 250" in found.warnings[0]
+
+
+@pytest.mark.parametrize("labels", ["a b c d ", "a  c  e", "a b b d d", "a"])
+def test_markers_with_a_label_of_their_own_are_read(tmp_path, labels):
+    labels = labels.split(" ")
+    places = np.random.default_rng(0).uniform(100, 900, (30, 5, 3))
+    path = write_c3d(tmp_path / "r.c3d", places, [*labels, "x1", "x2", "x3", "x4"][:5])
+    content = bytearray(path.read_bytes())
+    content[content.index(b"LABELS") + 11] = len(labels)  # the second of its dimensions
+    path.write_bytes(content)
+    found = load_markers(path)
+    own = [k for k, label in enumerate(labels) if label and labels.count(label) == 1]
+    assert found.names == tuple(labels[k] for k in own)
+    np.testing.assert_allclose(found.positions, places[:, own] / 1e3, rtol=1e-6)
+    assert found.warnings

@@ -43,6 +43,7 @@ def test_the_projects_own_file(tmp_path, millimetres):
 def test_every_format_is_listed():
     suffixes = {suffix for known in marker_formats() for suffix in known.suffixes}
     assert suffixes == {".c3d", ".csv", ".npz", ".trc", ".tsv"}
+    assert len(marker_formats()) == 6  # two of them are .csv
 
 
 def test_the_gloves_three_files_hold_one_recording(recordings):
@@ -90,8 +91,9 @@ def test_csv_rate_from_its_times(tmp_path, millimetres):
     path.write_text("\n".join(["# units: mm", head, *rows]))
     assert load_markers(path).fps == pytest.approx(FPS, rel=0.02)  # times are rounded to a millisecond
     path.write_text("\n".join(["# units: mm", head, rows[0], *rows[2:]]))
-    with pytest.raises(InputError, match="'Time' are not evenly spaced"):
-        load_markers(path)
+    found = load_markers(path)  # the row that is not there is a gap
+    assert found.num_frames == len(rows)
+    assert not found.visible[1].any()
 
 
 @settings(max_examples=60, deadline=None)
@@ -122,7 +124,6 @@ def read_or_refused(path: Path) -> bool:
 @pytest.mark.parametrize(
     ("suffix", "old", "new", "message"),
     [
-        ("tsv", "nail.3", "hand_back", "marker names repeat: hand_back"),
         ("tsv", "FREQUENCY", "FREQ", "not a Qualisys TSV .no FREQUENCY"),
         ("tsv", "FREQUENCY\t120", "FREQUENCY\t0", "FREQUENCY is '0'"),
         ("tsv", "NO_OF_FRAMES\t5", "NO_OF_FRAMES\t9", "5 of 9 frames are there; the file is truncated"),
@@ -135,7 +136,7 @@ def read_or_refused(path: Path) -> bool:
         ("csv", "# units: mm", "#", "no unit; add a line '# units: mm'"),
         ("csv", "# rate: 120", "#", "no frame rate; add a line"),
         ("csv", "hand_back_y", "hand_back_q", "column 'hand_back_q' is unknown"),
-        ("csv", "nail.3_", "hand_back_", "names repeat: hand_back"),
+        ("trc", "hand_back\t\t\tÅ tip", "nail.3\t\t\tnail.3", "none of its 3 markers has a label of its own"),
     ],
 )
 def test_bad_text_files_are_refused(tmp_path, millimetres, suffix, old, new, message):

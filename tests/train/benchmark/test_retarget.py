@@ -18,6 +18,7 @@ def rows(text, heading):
     return {row[0]: row[1:] for row in cells[2:]}
 
 
+@pytest.mark.slow
 def test_report_has_the_exact_projection_equal_to_scipy_and_below_the_others(capsys, recordings, tmp_path):
     recording, out = recordings / "dexmv_mustard" / "sequence.npz", tmp_path / "report.md"
     assert main([*SMALL, "--recording", str(recording), "--out", str(out)]) == 0

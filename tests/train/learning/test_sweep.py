@@ -50,7 +50,7 @@ def in_another_process(given: list[str]) -> tuple[int, str]:
     return done.returncode, done.stdout
 
 
-@pytest.mark.parametrize("launcher", LAUNCHERS)
+@pytest.mark.parametrize("launcher", [*LAUNCHERS[:2], pytest.param(LAUNCHERS[2], marks=pytest.mark.slow)])
 def test_a_job_that_fails_leaves_the_others_alone(tmp_path: Path, launcher: str):
     status, said = in_another_process(overrides(tmp_path, launcher, "config=pinch", "seed=0,1,2,4"))
     assert status == 1, said
@@ -102,6 +102,7 @@ def test_slurm_jobs_compose(tmp_path: Path, monkeypatch):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_trainings_beside_each_other(tiny: Config, tmp_path: Path):
     command = arguments(tiny, tmp_path)
     command = [part for part in command if not part.startswith("out=")]

@@ -4,6 +4,7 @@ import subprocess
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from tests.train.commands import arguments
 from train.settings.config import Config
@@ -15,6 +16,7 @@ def free_port() -> int:
         return listener.getsockname()[1]
 
 
+@pytest.mark.slow
 def test_two_processes_are_two_devices(tiny: Config, tmp_path: Path):
     """Bit for bit: how devices are spread over processes does not matter."""
     together = f"localhost:{free_port()}"
@@ -22,7 +24,7 @@ def test_two_processes_are_two_devices(tiny: Config, tmp_path: Path):
     commands = [
         (arguments(tiny, shared, processes=2, process=0, coordinator=together), {}),
         (arguments(tiny, shared, processes=2, process=1, coordinator=together), {}),
-        (arguments(tiny, alone), {"XLA_FLAGS": "--xla_force_host_platform_device_count=2"}),
+        (arguments(tiny, alone), {"XLA_FLAGS": f"{os.environ['XLA_FLAGS']} --xla_force_host_platform_device_count=2"}),
     ]
     running = [
         subprocess.Popen(command, env=os.environ | extra, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from envs.demonstrations.dataset import make_missing_sets
 from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from mjx_hand.view.figures import plots
@@ -13,7 +14,7 @@ from train.benchmark.gpu.bench import Bench
 from train.benchmark.gpu.record import Record, Table
 from train.benchmark.gpu.scale import gpu_config
 from train.benchmark.learning import measure_learning
-from train.experiment.setup import load_env, make_sets
+from train.experiment.setup import load_env
 from train.learning.curve import Point, is_finished
 from train.ppo import train
 from train.settings.config import Config
@@ -100,7 +101,7 @@ def _env(bench: Bench, config: Config, record: Record) -> TrackingEnv:
     """The training part, made once; on the host's engine, and that is noted, where the GPU's refuses its objects."""
     engine = bench.scale.training_engine or bench.engine
     if config.name not in bench.trained:
-        make_sets(config)
+        make_missing_sets(config.data, config.demonstrations)
         try:
             env = load_env(dataclasses.replace(config, engine=engine), "train")
         except InputError as error:

@@ -36,7 +36,7 @@ def act() -> Act:
     hand = build_rigid_hand(load_hand())
     corners = HALF * np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
     description = ObjectDescription(kind="mesh", size=np.full(3, HALF), mass=0.1, friction=0.9, hulls=corners[None])
-    posture = solve_postures(grasp_type("pinch"), [hand], np.full((1, 3), HALF))
+    posture = solve_postures(grasp_type("pinch"), [hand], [description])
     rotation = Rotation.from_matrix(np.asarray(posture.rotation[0], float)).as_matrix()
     angles = np.asarray(posture.angles[0], float)
     wrist = np.asarray(posture.position[0], float)
@@ -105,6 +105,7 @@ def test_a_grasp_off_the_object_is_lost_and_a_good_one_is_not(act, good):
         assert np.linalg.norm(score.settled.position[0] - good.position) < 0.01
 
 
+@pytest.mark.slow
 def test_a_grasp_is_found_that_carries_the_object_in_a_demonstration(act):
     """Independent of how it was found: the demonstration's own reference, stepped in MuJoCo from its first frame."""
     trajectory = grasp_trajectory(act, search_grasp(act, act.held[None], FORCE, tried=48)[None])
@@ -133,6 +134,7 @@ def test_a_grasp_is_found_that_carries_the_object_in_a_demonstration(act):
     assert float(gaps.min()) > -0.003
 
 
+@pytest.mark.slow
 def test_an_object_too_heavy_for_every_one_is_refused(act, good):
     heavy = dataclasses.replace(act, object=replace(act.object, mass=20.0))
     with pytest.raises(

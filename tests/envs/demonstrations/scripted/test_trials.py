@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.scripted.trials import perform_trials, support_boxes
 from envs.grasps import grasp_names, grasp_type
-from envs.scene import OBJECT, scene_model, wrist_coordinates
+from envs.scene import OBJECT, scene_spec, wrist_coordinates
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
 from mjx_hand.rigid.build import build_rigid_hand
@@ -50,7 +50,7 @@ def test_a_type_is_performed_and_is_what_it_is_called(name, hand):
         assert abs(rise[25]) < 0.003  # it stood still before it was touched
         quaternions = Rotation.from_matrix(trial.wrist_rotation).as_quat(scalar_first=True)
         base = trial.wrist_rotation[0]
-        model = scene_model(hand, trial.object, *support_boxes(grasp), base)
+        model = scene_spec(hand, trial.object, *support_boxes(grasp), base).compile()
         wrist = wrist_coordinates(trial.wrist_position, quaternions, base)
         touching = fingers_at(model, np.concatenate([wrist[-1], trial.angles[-1], trial.object_pose[-1]]))
         must, must_not = TOUCHING.get(name, (set(), set()))

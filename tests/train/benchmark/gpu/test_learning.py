@@ -44,7 +44,7 @@ def test_an_engine_that_refuses_the_objects_is_noted_and_physics_is_native(bench
         return env
 
     monkeypatch.setattr(learning, "load_env", load_env)
-    monkeypatch.setattr(learning, "make_sets", lambda config: None)
+    monkeypatch.setattr(learning, "make_missing_sets", lambda data, root: None)
     bench = dataclasses.replace(bench, engine="warp", scale=dataclasses.replace(REHEARSAL, training_engine=None))
     record = Record("learn", "")
     config = learning.gpu_config("all", REHEARSAL, tmp_path, tmp_path)

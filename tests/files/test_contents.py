@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from mjx_hand.capture.datasets.contents import WHOLE, plain, read_contents
 from mjx_hand.capture.load import load_motion
 from mjx_hand.errors import InputError
+from mjx_hand.files.contents import WHOLE, plain, read_contents
 from tests.files.torch_layout import Tensor, dumps
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from mjx_hand.errors import InputError, reason_of
 from mjx_hand.files import safe_pickle
+from mjx_hand.files.input_file import refuse_pointer
 from mjx_hand.files.npz_reader import Archive
 from mjx_hand.files.safe_tensor import is_tensor, tensor
 
@@ -33,6 +34,7 @@ def read_contents(path: Path) -> Mapping[str, Any]:
     """
     if not path.is_file():
         return {}
+    refuse_pointer(path)
     if path.suffix == ".npz" or (path.suffix not in (*PICKLES, ".npy") and zipfile.is_zipfile(path)):
         return _archive(path)
     if path.suffix == ".npy":

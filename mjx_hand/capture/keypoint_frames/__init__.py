@@ -1,0 +1,1 @@
+"""Hands frame by frame, as trackers list them, and which of them are one hand."""
