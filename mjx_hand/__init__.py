@@ -10,7 +10,7 @@ Metres, radians, seconds; quaternions wxyz; MANO's joint order and right-hand fr
 lists the public names.
 """
 
-from mjx_hand.cli.stopping import stop_quietly
+from mjx_hand.cli.terminal.stopping import stop_quietly
 from mjx_hand.lazy_exports import lazy_exports
 
 __version__ = "0.2.0"

@@ -1,7 +1,7 @@
 """The one exception that means "the input is at fault, and here is how to fix it"."""
 
-_LONGEST = 800  # letters of a message; what a file holds may be of any length
-_HEAD = 500  # of them from its beginning: the end says how to fix it
+_LONGEST = 990  # letters of a message; what a file holds may be of any length
+_HEAD = 700  # of them from its beginning: the end says how to fix it
 
 
 class InputError(ValueError):

@@ -82,7 +82,8 @@ def _strings(path: str | Path, arrays: Arrays, name: str, ndim: int) -> np.ndarr
     if name not in arrays:
         raise InputError(f"{path}: has no {name!r}")
     value = np.asarray(arrays[name])
-    if value.dtype.kind != "U" or value.ndim != ndim:
+    empty = value.shape == (0,)  # which NumPy takes for numbers
+    if not (value.dtype.kind == "U" or empty) or value.ndim != ndim:
         raise InputError(
             f"{path}: {name} holds {value.dtype} of shape {value.shape}, expected "
             f"{'one text' if ndim == 0 else 'a list of texts'}"

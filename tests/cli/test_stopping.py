@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from mjx_hand.cli.stopping import is_program
+from mjx_hand.cli.terminal.stopping import is_program
 
 
 @pytest.mark.parametrize(

@@ -135,7 +135,8 @@ def _own(folder: Path) -> list[Valid]:
     )
     for name, save, value, reader in kinds:
         path = _new(folder, name) / "a.npz"
-        save(value, path)
+        write: Any = save
+        write(value, path)
         found.append(_single(name, path, reader, "info"))
     path = _new(folder, "truth NPZ") / "a.truth.npz"
     truth = {"angles": joints.angles, **wrist, "object_pose": pose, "shape": np.zeros(10)}
