@@ -49,9 +49,12 @@ def load_motion(
     if side not in (None, "right", "left"):
         raise InputError(f"side is {side!r}; give 'right' or 'left'")
     if markers is not None:
-        if sequence is not None:
-            raise InputError(f"{path}: marker files hold one recording; leave out sequence=")
-        return _fitted(path, markers, load_hand(mano, side or "right"), fps)
+        if sequence is not None or fps is not None:
+            raise InputError(
+                f"{path}: marker files hold one recording and its rate; leave out sequence= and fps= (where a file "
+                "says none: load_markers(path, fps=), fit_markers)"
+            )
+        return _fitted(path, markers, load_hand(mano, side or "right"))
     request = Request(
         side=side,
         sequence=sequence,
@@ -69,10 +72,10 @@ def load_motion(
     raise InputError(f"{path}: not a recording that is known here, but {_found(path, contents)}")
 
 
-def _fitted(path: Path, markers: str | Path, hand: HandModel, fps: float | None) -> Motion:
+def _fitted(path: Path, markers: str | Path, hand: HandModel) -> Motion:
     """The motion of the hand that wears these markers."""
     marker_set = load_marker_set(markers, hand)
-    recording = match_labels(load_markers(path, fps=fps), marker_set).recording
+    recording = match_labels(load_markers(path), marker_set).recording
     return fit_markers(fill_short_gaps(recording, FILL), hand, marker_set)[0]
 
 

@@ -77,3 +77,10 @@ def test_retarget_passes_warnings_on(tmp_path, capsys):
     assert rows[2].endswith(",")
     assert main(["info", str(tmp_path / "out" / "a.npz")]) == 0
     assert "bone lengths: vary by" in capsys.readouterr().out
+
+
+def test_points_of_one_place_are_told_before_anything_is_fitted(tmp_path, capsys):
+    points = POINTS.copy()
+    points[:, 8] = points[:, 7]
+    assert main(["keypoints", str(written(tmp_path / "hand.json", points)), "--out", str(tmp_path / "m.npz")]) == 2
+    assert "index_dip and index_tip at one place, in 100 % of the frames" in capsys.readouterr().err

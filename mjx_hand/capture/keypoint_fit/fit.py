@@ -26,6 +26,7 @@ from mjx_hand.errors import InputError
 from mjx_hand.hand.model import HandModel
 from mjx_hand.motion import Motion, check_motion
 from mjx_hand.motion.gaps import fill_lines, fill_turns
+from mjx_hand.motion.plausibility.finding import judged
 from mjx_hand.motion.plausibility.motions import plausible_motion
 from mjx_hand.motion.plausibility.points import residual_findings
 from mjx_hand.motion.resample import matrix_quaternions, quaternion_matrices
@@ -84,6 +85,8 @@ def fit_keypoints(
         raise InputError(f"{name}: {', '.join(never)} never seen; every finger joint and tip is needed")
     observed = median_lengths(recording.positions)
     check_size(name, hand, observed)
+    doubts = keypoint_findings(recording, hand)
+    judged(name, doubts)  # before the fit: points of one place have no direction
     seen = fill_short_gaps(recording.positions, round(settings.longest_gap * recording.fps))
     if settings.cutoff is not None:
         seen = low_pass_keypoints(seen, recording.fps, settings.cutoff)
@@ -115,7 +118,7 @@ def fit_keypoints(
     report = make_report(recording.positions, fitted, valid)
     size = float(np.linalg.norm(rest.keypoints[_MIDDLE_TIP]))
     found = [
-        *keypoint_findings(recording, hand),
+        *doubts,
         *residual_findings(_residual(recording.positions[valid], report.fitted[valid]), size),
     ]
     return plausible_motion(check_motion(motion), *found, name=name), report

@@ -61,7 +61,13 @@ def number_of_frames(header: C3DHeader, parameters: Parameters, content: bytes) 
 
 
 def _is_count(value: list | None) -> bool:
-    return bool(value) and not isinstance(value[0], str) and bool(np.isfinite(value[0])) and value[0] > 0
+    return (
+        value is not None
+        and len(value) > 0
+        and not isinstance(value[0], str)
+        and bool(np.isfinite(value[0]))
+        and value[0] > 0
+    )
 
 
 def frame_rate(header: C3DHeader, parameters: Parameters) -> tuple[float | None, tuple[str, ...]]:

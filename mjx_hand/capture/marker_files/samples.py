@@ -93,7 +93,7 @@ def recording_of(
     if not seen.any():
         raise InputError(f"{path}: none of its {len(names)} markers is seen in any of {len(positions)} frames")
     even = timeline.sampled(np.where(seen[..., None], positions, np.nan))
-    visible = np.isfinite(even).all(axis=2)
+    visible = np.asarray(np.isfinite(even).all(axis=2))
     metres = np.where(visible[..., None], even, 0.0) * unit_metres(path, unit)
     return check_recording(
         MarkerRecording(

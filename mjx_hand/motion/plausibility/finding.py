@@ -35,7 +35,7 @@ def judged(source: str, findings: Iterable[Finding], before: tuple[str, ...] = (
         InputError: a finding is beyond doubt; all such are named.
     """
     findings = list(findings)
-    wrong = [str(finding) for finding in findings if finding.certain]
+    wrong = dict.fromkeys(str(finding) for finding in findings if finding.certain)
     if wrong:
         raise InputError(f"{source}: no hand's motion: {' | '.join(wrong)}")
     return tuple(dict.fromkeys((*before, *map(str, findings))))

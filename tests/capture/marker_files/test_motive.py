@@ -17,7 +17,7 @@ KINDS = ["Rotation"] * 4 + ["Position"] * 12
 AXES = ["X", "Y", "Z", "W", *(["X", "Y", "Z"] * 4)]
 
 
-def write(path, head=HEAD, axes=AXES, numbers=range(4)):
+def write(path, head=HEAD, axes=AXES, numbers=(0, 1, 2, 3)):
     rng = np.random.default_rng(0)
     values = np.round(rng.uniform(100, 900, (4, 16)), 3)
     rows = [f"{k},{k / 120:.6f}," + ",".join(map(str, values[k])) for k in numbers]
