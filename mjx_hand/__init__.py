@@ -10,8 +10,11 @@ Metres, radians, seconds; quaternions wxyz; MANO's joint order and right-hand fr
 lists the public names.
 """
 
+from mjx_hand.cli.terminal.stopping import stop_quietly
 from mjx_hand.lazy_exports import lazy_exports
 
 __version__ = "0.2.0"
+
+stop_quietly()
 
 __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)  # type: ignore[assignment]  # the stub's names

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import jax
 import pytest
 
 from mjx_hand.compile_cache import cache_folder, enable_compile_cache
@@ -43,6 +44,30 @@ def test_folder_that_cannot_be_made_is_an_input_error(monkeypatch, tmp_path):
     monkeypatch.setenv("MJX_HAND_CACHE", str(tmp_path / "file" / "below"))
     with pytest.raises(InputError, match="set MJX_HAND_CACHE"):
         enable_compile_cache()
+
+
+def test_jaxs_own_variable_counts(monkeypatch, tmp_path):
+    monkeypatch.delenv("MJX_HAND_CACHE", raising=False)
+    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", str(tmp_path / "jax"))
+    assert cache_folder() == tmp_path / "jax"
+    monkeypatch.setenv("MJX_HAND_CACHE", str(tmp_path / "own"))
+    assert cache_folder() == tmp_path / "own"
+
+
+def test_a_home_that_cannot_be_written_is_said_and_nothing_kept(monkeypatch, tmp_path, capsys):
+    (tmp_path / "file").touch()
+    for name in ("MJX_HAND_CACHE", "JAX_COMPILATION_CACHE_DIR", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path / "file" / "home"))
+    before = jax.config.values["jax_compilation_cache_dir"]
+    try:
+        assert enable_compile_cache() is None
+        assert jax.config.values["jax_compilation_cache_dir"] is None
+    finally:
+        jax.config.update("jax_compilation_cache_dir", before)
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "going on without" in said
 
 
 def test_second_process_reuses_what_the_first_compiled_and_says_nothing(tmp_path: Path):

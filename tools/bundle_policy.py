@@ -11,7 +11,7 @@ from pathlib import Path
 from mjx_hand.motion.demonstration import Demonstration, save_demonstration
 from train.experiment import bundled_policies
 from train.experiment.evaluate_seeds import median_and_worst
-from train.experiment.setup import load_env, rolled_out
+from train.experiment.setup import load_env, rolled_out, settled
 from train.learning.checkpoint import Checkpoint, save_checkpoint
 from train.settings.config import Config, command
 
@@ -34,4 +34,4 @@ def main(config: Config) -> None:
 
 
 if __name__ == "__main__":
-    command(main)
+    command(main, settled)

@@ -14,6 +14,7 @@ from rich.table import Table as RichTable
 
 from mjx_hand.view.report import Table, write_report
 from train.experiment.evaluate_seeds import evaluate_seeds, shared_folder
+from train.experiment.setup import settled
 from train.reports.evaluation_page import evaluation_page, films, tables
 from train.reports.evaluation_record import write_results
 from train.settings.config import Config, command_of_seeds
@@ -54,7 +55,7 @@ def main(configs: Sequence[Config]) -> None:
 
 def command_line() -> None:
     """The command, with this process's arguments."""
-    command_of_seeds(main)
+    command_of_seeds(main, settled)
 
 
 if __name__ == "__main__":

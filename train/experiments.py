@@ -41,6 +41,9 @@ def run_command(name: str, text: str, argv: Sequence[str] | None, task: Callable
     except InputError as error:
         print(f"{name}: {error}", file=sys.stderr)
         return 2
+    except OSError as error:  # a path that the system cannot use: too long a name, no permission, a full disk
+        print(f"{name}: {InputError(error)}", file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         print(f"\n{name}: stopped; the same command goes on from here", file=sys.stderr)
         return 130
@@ -73,9 +76,16 @@ def listed(own: Mapping[str, str], key: str, otherwise: Sequence[str]) -> list[s
     return list(dict.fromkeys(names))
 
 
+def _is_finished(config: Config) -> bool:
+    try:
+        return is_finished(config, load_curve(config.out))
+    except InputError:  # damaged: the training writes it anew
+        return False
+
+
 def measure(configs: Sequence[Config]) -> Experiment:
     """Train and evaluate one experiment; what was done before with the same settings is taken as it is."""
-    finished = all(is_finished(config, load_curve(config.out)) for config in configs)
+    finished = all(_is_finished(config) for config in configs)
     folder = shared_folder(configs)
     summary = cached_results(configs) if finished and not configs[0].fresh else None
     if summary is None:

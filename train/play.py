@@ -7,14 +7,14 @@ diverged in training instead: the state before the step, and each physics step o
 """
 
 import dataclasses
-from pathlib import Path
 
 from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from mjx_hand.view.browser.viewer import Viewer
 from train.experiment.bundled_policies import bundled_env, bundled_policy
 from train.experiment.evaluate_seeds import median_and_worst
-from train.experiment.setup import load_env, rolled_out
+from train.experiment.setup import chosen_path, load_env, rolled_out, settled
+from train.learning.checkpoint import load_checkpoint
 from train.learning.unstable import load_unstable
 from train.settings.config import Config, command
 from train.view.play_scene import rollout_scene
@@ -47,6 +47,8 @@ def rollout_viewer(config: Config) -> Viewer:
     Raises:
         InputError: no such demonstration, or what `chosen_checkpoint` and `Viewer` refuse.
     """
+    if config.checkpoint:  # before anything is made for it
+        load_checkpoint(chosen_path(config))
     config, env = _env(config)
     _, rollouts, scores = rolled_out(config, env)
     errors = scores.scores["tracking_error_cm"]
@@ -64,7 +66,7 @@ def rollout_viewer(config: Config) -> Viewer:
 def _env(config: Config) -> tuple[Config, TrackingEnv]:
     """The demonstrations to play, and the configuration with the policy to play them."""
     included = bundled_policy(config.name)
-    if config.checkpoint or included is None or (Path(config.out) / "best.npz").is_file():
+    if config.checkpoint or included is None or chosen_path(config).is_file():
         return config, load_env(config, "heldout")
     print(f"nothing is trained in {config.out}: playing the policy that comes with mjx-hand", flush=True)
     config = dataclasses.replace(config, checkpoint=str(included))
@@ -81,7 +83,7 @@ def main(config: Config) -> None:
 
 def command_line() -> None:
     """The command, with this process's arguments."""
-    command(main)
+    command(main, settled)
 
 
 if __name__ == "__main__":

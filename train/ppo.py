@@ -19,22 +19,26 @@ from envs.demonstrations.dataset import make_missing_sets
 from envs.evaluation.evaluate import evaluate
 from envs.evaluation.roll_out import make_roll_out
 from envs.parallel import ParallelEnv
+from envs.physics.engine import available_engine
 from envs.tracking import TrackingEnv
 from mjx_hand.files.npz_archive import replacing
 from mjx_hand.progress import counter
+from mjx_hand.pytree import pytree
 from train.experiment.setup import load_env
 from train.learning.cadence import rollouts_per_demonstration, updates_between
-from train.learning.checkpoint import Checkpoint, save_checkpoint
-from train.learning.curve import Point
+from train.learning.checkpoint import Checkpoint, is_saved, save_checkpoint
+from train.learning.curve import CURVE, Point, points_of
 from train.learning.interruption import interruptions
 from train.learning.learner import Learner, LearnerState, Networks
 from train.learning.policy import deterministic_policy
-from train.learning.run_folder import RunFolder, run_folder
+from train.learning.run_folder import BEST, LAST, RunFolder, run_folder
 from train.learning.sweep import sweepable_command
 from train.learning.unstable import UnstableLog
 from train.settings.config import Config
 from train.settings.device import described
+from train.settings.peers import watching_others
 from train.settings.processes import agreed, first_alone_speaks, gathered, is_first, join
+from train.settings.saved import policy_settings
 
 _LOG_SECONDS = 2.0  # between two lines of training metrics
 Watch = Callable[[Sequence["Point"], float], bool]
@@ -60,11 +64,12 @@ def train(config: Config, env: TrackingEnv | None = None, watch: Watch | None = 
 
 def _train(config: Config, env: TrackingEnv | None, folder: RunFolder, watch: Watch | None) -> list[Point]:
     if env is None:
+        available_engine(config.engine)  # before the minutes that sets take
         make_missing_sets(config.data, config.demonstrations)
         env = load_env(config, "train")
     learner = Learner(ParallelEnv(env, guard=config.debug.nan_guard), config.ppo)
-    state, points, seconds = _start(config, learner, folder)
-    run = _Run(config, env, learner, folder, state, points, seconds)
+    run = _Run(config, env, learner, folder)
+    run.write_results()
     if run.finished:
         print(f"{config.name!r} is trained already ({folder.path}); train it anew with fresh=true")
         return run.points
@@ -73,7 +78,7 @@ def _train(config: Config, env: TrackingEnv | None, folder: RunFolder, watch: Wa
         f"learner on {described()}, {config.ppo.num_envs} worlds; results in {folder.path}",
         flush=True,
     )
-    if seconds:
+    if seconds := run.seconds:
         print(f"going on from {run.steps:,} steps", flush=True)
     with interruptions() as asked:
         stopped = run.until_finished(asked, watch)
@@ -87,35 +92,40 @@ def _train(config: Config, env: TrackingEnv | None, folder: RunFolder, watch: Wa
     return run.points
 
 
-def _start(config: Config, learner: Learner, folder: RunFolder) -> tuple[LearnerState, list[Point], float]:
-    """State, evaluations and seconds so far: of the run that is gone on with, or of a new one."""
-    saved = folder.load(learner.template)
-    if saved is None:
-        return learner.initial(config.seed), [], 0.0
-    state, notes = saved
-    return learner.placed(state), [Point(**point) for point in notes["points"]], notes["seconds"]
+@pytree
+class _Saved:
+    """What a state holds: all that the learner carries, and the networks of the best and of the last evaluation.
+
+    Before the first evaluation those are the untrained ones.
+    """
+
+    learner: LearnerState
+    best: Networks
+    last: Networks
 
 
 class _Run:
-    """A training on its way: its state, and what it says and writes."""
+    """A training on its way, new or gone on with: its state, and what it says and writes."""
 
-    def __init__(
-        self,
-        config: Config,
-        env: TrackingEnv,
-        learner: Learner,
-        folder: RunFolder,
-        state: LearnerState,
-        points: list[Point],
-        seconds: float,
-    ):
+    def __init__(self, config: Config, env: TrackingEnv, learner: Learner, folder: RunFolder):
         self.config, self.env, self.learner, self.folder = config, env, learner, folder
-        self.state, self.points = state, points
-        self.updates = int(state.updates)
-        self.last = config.ppo.budget
+        networks = learner.template.params
+        saved = folder.load(_Saved(learner=learner.template, best=networks, last=networks))
+        self.points: list[Point] = []
+        self.seconds = 0.0
+        if saved is None:
+            self.state = learner.initial(config.seed)
+            self.best = self.last = gathered(self.state.params)
+        else:
+            state, notes = saved
+            self.state, self.best, self.last = learner.placed(state.learner), state.best, state.last
+            self.points, self.seconds = points_of(notes), float(notes["seconds"])
+        self.updates = int(self.state.updates)
+        self.settings = policy_settings(config)
+        self.budget = config.ppo.budget
         self.repeats = rollouts_per_demonstration(env)
         self.between = updates_between(config.checks, config.ppo, env, self.repeats)
-        self.start = time.monotonic() - seconds
+        self.start = time.monotonic() - self.seconds
         self.evaluating = 0.0  # seconds
         policy = deterministic_policy(config.ppo, env.observation_size, env.action_size)
         self.unstable = UnstableLog(folder.path / "unstable", env, config.seed) if config.debug.nan_guard else None
@@ -130,25 +140,25 @@ class _Run:
         if not self.points:
             return False
         last = self.points[-1]
-        return last.success >= self.config.checks.stop_at or (self.updates >= self.last and last.steps == self.steps)
+        return last.success >= self.config.checks.stop_at or (self.updates >= self.budget and last.steps == self.steps)
 
     def until_finished(self, asked: Callable[[], int], watch: Watch | None) -> int:
         """Update, evaluate and save until all is done, or watched enough; the signal's number if one came before."""
         with (
             SummaryWriter(str(self.folder.path / "tensorboard"), write_to_disk=is_first()) as writer,
-            counter(self.last * self.learner.steps_per_update, "training (steps)", self.steps) as advance,
+            counter(self.budget * self.learner.steps_per_update, "training (steps)", self.steps) as advance,
         ):
             logged = time.monotonic()
             untrained = None
             if not self.points:
-                untrained = gathered(self.state.params)  # an update gives up what it is given
+                untrained = self.last  # an update gives up what it is given
                 self._save()
             while not self.finished:
                 stopped = agreed(asked())
                 if stopped:
                     self._save()
                     return stopped
-                self.state, metrics = self.learner.update(self.state, self.updates / self.last)
+                self.state, metrics = self.learner.update(self.state, self.updates / self.budget)
                 self.updates += 1
                 if untrained is not None:
                     self._say_memory()
@@ -160,7 +170,7 @@ class _Run:
                 if untrained is not None:  # after the first update, which says soonest whether a training runs at all
                     self._check(writer, untrained, 0)
                     untrained = None
-                due = self.updates % self.between == 0 or self.updates >= self.last
+                due = self.updates % self.between == 0 or self.updates >= self.budget
                 if due and not self.finished:
                     self._check(writer, gathered(self.state.params), self.steps)
                 if due or self.finished:
@@ -192,29 +202,40 @@ class _Run:
             tracking_error_cm=scores["tracking_error_cm"],
             rotation_error_deg=scores["object_rotation_error_deg"],
         )
-        best = min((_rank(p) for p in self.points), default=None)
+        self.evaluating += time.monotonic() - began
         self.points.append(point)
+        self.last = params
+        if _best(self.points) is point:
+            self.best = params
         for name, score in scores.items():
             writer.add_scalar(f"evaluation/{name}", score, steps)
-        checkpoint = Checkpoint(
-            policy=params.policy,
-            value=params.value,
-            steps=steps,
-            success=point.success,
-            experiment=self.config.name,
-            observation_size=self.env.observation_size,
-        )
-        if is_first():
-            save_checkpoint(checkpoint, self.folder.path / "last.npz")
-            if best is None or _rank(point) < best:
-                save_checkpoint(checkpoint, self.folder.path / "best.npz")
-            _write_curve(self.points, self.folder.path / "curve.csv")
+        self.write_results()
         print(
             f"  {point.steps:>9,} steps, {point.seconds:4.0f} s: success {100 * point.success:5.1f} %, "
             f"tracking error {point.tracking_error_cm:.2f} cm",
             flush=True,
         )
-        self.evaluating += time.monotonic() - began
+
+    def write_results(self) -> None:
+        """Write those of the best and the last policy and the curve that are not there, or not as the state has them.
+
+        Each may have been lost, damaged, or written after the state that is gone on from.
+        """
+        if not (is_first() and self.points):
+            return
+        for networks, point, name in ((self.last, self.points[-1], LAST), (self.best, _best(self.points), BEST)):
+            checkpoint = Checkpoint(
+                policy=networks.policy,
+                value=networks.value,
+                steps=point.steps,
+                success=point.success,
+                experiment=self.config.name,
+                observation_size=self.env.observation_size,
+                settings=self.settings,
+            )
+            if not is_saved(checkpoint, self.folder.path / name):
+                save_checkpoint(checkpoint, self.folder.path / name)
+        _write_curve(self.points, self.folder.path / CURVE)
 
     def _say_memory(self) -> None:
         if (needed := self.learner.memory()) is not None:
@@ -222,27 +243,30 @@ class _Run:
             print(f"  an update needs {needed / 1e6:,.0f} MB, {each / 1e3:,.0f} kB for each world", flush=True)
 
     def _save(self) -> None:
-        state = gathered(self.state)
+        state = _Saved(learner=gathered(self.state), best=self.best, last=self.last)
         if is_first():
             points = [dataclasses.asdict(point) for point in self.points]
             self.folder.save(self.steps, state, {"points": points, "seconds": time.monotonic() - self.start})
 
 
-def _rank(point: Point) -> tuple[float, float]:
-    return (-point.success, point.tracking_error_cm)
+def _best(points: Sequence[Point]) -> Point:
+    """The first of the best evaluations."""
+    return min(points, key=lambda point: (-point.success, point.tracking_error_cm))
 
 
-def _write_curve(points: list[Point], path: Path) -> None:
+def _write_curve(points: Sequence[Point], path: Path) -> None:
     names = [field.name for field in dataclasses.fields(Point)]
     lines = [",".join(names), *(",".join(f"{value:g}" for value in dataclasses.astuple(p)) for p in points)]
-    with replacing(path) as temporary:
-        temporary.write_text("\n".join(lines) + "\n")
+    text = "\n".join(lines) + "\n"
+    if not (path.is_file() and path.read_bytes() == text.encode()):
+        with replacing(path) as temporary:
+            temporary.write_text(text)
 
 
 def main(config: Config) -> Mapping[str, str]:
     """Join the other processes, if there are any, and train; what the last evaluation said."""
     join(config.distributed)
-    with first_alone_speaks():
+    with watching_others(config.distributed), first_alone_speaks():
         last = train(config)[-1]
     return {
         "steps": f"{last.steps:,}",

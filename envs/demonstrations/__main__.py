@@ -14,7 +14,6 @@ from typing import cast
 
 import numpy as np
 from omegaconf import DictConfig, OmegaConf
-from omegaconf.errors import OmegaConfBaseException
 from PIL import Image
 
 from envs.demonstrations.contact_sheet import contact_sheet
@@ -30,7 +29,7 @@ from envs.demonstrations.twin_hands import twins
 from envs.settings import from_dict
 from mjx_hand.cli.output import print_table
 from mjx_hand.compile_cache import enable_compile_cache
-from mjx_hand.errors import InputError
+from mjx_hand.errors import InputError, reason_of
 from mjx_hand.files.npz_archive import replacing
 from mjx_hand.progress import shares
 from mjx_hand.view.video.renderer import RendererUnavailable
@@ -60,9 +59,10 @@ def settings_of(arguments: Sequence[str]) -> tuple[SetSettings, Path]:
         overrides = OmegaConf.from_dotlist([f"{key.removeprefix('data.')}={value}" for key, value in given.items()])
         merged = OmegaConf.merge(schema, cast(dict, data).get("data", {}), overrides)
         return from_dict(SetSettings, OmegaConf.to_container(merged, throw_on_missing=True)), Path(root)
-    except OmegaConfBaseException as error:
-        line = str(error).strip().splitlines()[0]
-        raise InputError(f"{line}; python -m train.ppo --cfg job lists the options of data") from None
+    except InputError:
+        raise
+    except Exception as error:  # numbers and brackets that Python itself gives up on are not OmegaConf's own errors
+        raise InputError(f"{reason_of(error)}; python -m train.ppo --cfg job lists the options of data") from None
 
 
 def _make_writable(node: DictConfig) -> None:
@@ -139,6 +139,9 @@ def command_line() -> int:
         main(sys.argv[1:])
     except InputError as error:
         print(f"demonstrations: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:  # a path that the system cannot use: too long a name, no permission, a full disk
+        print(f"demonstrations: {InputError(error)}", file=sys.stderr)
         return 2
     return 0
 

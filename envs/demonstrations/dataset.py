@@ -9,7 +9,6 @@ people, object sizes and seeds. A set made from a real recording holds variation
 import dataclasses
 import json
 import shutil
-import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -23,7 +22,8 @@ from envs.demonstrations.scripted.simulated_capture import project_recording, re
 from envs.demonstrations.scripted.trials import perform_trials
 from envs.demonstrations.set_settings import SetSettings, set_folder
 from envs.grasps import grasp_type
-from mjx_hand.errors import InputError
+from mjx_hand.files.npz_archive import replacing
+from mjx_hand.files.working_folder import remove_abandoned, working_folder
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion.demonstration import load_demonstration, save_demonstration
 from mjx_hand.motion.motion import load_motion_file, save_motion
@@ -62,13 +62,9 @@ def make_set(settings: SetSettings, root: str | Path, report: Report = lambda wh
     """
     folder = set_folder(settings, root)
     if folder.is_dir():
+        remove_abandoned(folder)
         return folder
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}-"))
-    except OSError as error:
-        raise InputError(f"cannot write {folder}: {error.strerror}; choose another folder for demonstrations") from None
-    try:
+    with working_folder(folder) as temporary:
         if settings.grasp == RECORDED:
             yields = _make_variations(settings, temporary, report)
         elif (usual := dataclasses.replace(settings, capture=settings.capture.projected_as_usual())) != settings:
@@ -79,16 +75,15 @@ def make_set(settings: SetSettings, root: str | Path, report: Report = lambda wh
                 part: _make_part(settings, people, settings.seed + offset * _APART, temporary / part, part, report)
                 for offset, (part, people) in enumerate(parts.items())
             }
-        (temporary / YIELD).write_text(json.dumps(yields, indent=1))
-        (temporary / "settings.json").write_text(json.dumps(dataclasses.asdict(settings), indent=1))
+        for name, told in ((YIELD, yields), ("settings.json", dataclasses.asdict(settings))):
+            with replacing(temporary / name) as file:
+                file.write_text(json.dumps(told, indent=1))
         temporary.chmod(0o755)
         try:
             temporary.rename(folder)
         except OSError:
             if not folder.is_dir():  # another process may have made the same set meanwhile: then its is as good
                 raise
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
     return folder
 
 

@@ -91,17 +91,27 @@ def default_engine() -> str:
     return "mjx"
 
 
-def make_engine(name: str, models: Sequence[mujoco.MjModel], substeps: int) -> Engine:
-    """The engine called `name` ("auto" picks `default_engine`) over a family of models.
+def available_engine(name: str) -> str:
+    """The engine that `name` stands for ("auto": `default_engine`).
 
     Raises:
-        InputError: no engine of that name, one that is not installed, or models that are not one family.
+        InputError: no engine of that name, or one that is not installed.
     """
     name = default_engine() if name == "auto" else name
     if name not in ENGINES:
         raise InputError(f"engine {name!r} is not known; valid: auto, {', '.join(ENGINES)}")
     if name == "warp" and importlib.util.find_spec("warp") is None:
         raise InputError("engine 'warp' is not installed; install it with: pip install 'mjx-hand[warp]'")
+    return name
+
+
+def make_engine(name: str, models: Sequence[mujoco.MjModel], substeps: int) -> Engine:
+    """The engine called `name` ("auto" picks `default_engine`) over a family of models.
+
+    Raises:
+        InputError: no engine of that name, one that is not installed, or models that are not one family.
+    """
+    name = available_engine(name)
     check_family(models)
     module = importlib.import_module(f"envs.physics.{name}")
     return module.make(models, substeps)

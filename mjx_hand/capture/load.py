@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from mjx_hand.capture.datasets.dataset_format import DatasetFormat, Request, dataset_formats
+from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request, dataset_formats
 from mjx_hand.capture.marker_files.load_markers import load_markers
 from mjx_hand.capture.marker_fit.fit import fit_markers
 from mjx_hand.capture.markers.gap_filling import FILL, fill_short_gaps
@@ -90,7 +90,7 @@ def _asked_for(path: Path, known: DatasetFormat, request: Request, motion: Motio
     return motion
 
 
-def _found(path: Path, contents: dict) -> str:
+def _found(path: Path, contents: Contents) -> str:
     if path.suffix.lower() in _MARKER_FILES:
         return "a marker recording: name its marker set, markers='hand22' or a YAML file, or run mjx-hand fit"
     if "schema" in contents:

@@ -1,5 +1,6 @@
 """What is known of a file, for people: its kind, its facts, and the commands that take it further."""
 
+import math
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -67,6 +68,8 @@ def file_facts(
     Raises:
         InputError: there is no such file, it is damaged, or nothing here reads it.
     """
+    if fps is not None and not 0 < fps < math.inf:
+        raise InputError(f"fps is {fps}; give frames per second, a number above 0")
     if not path.is_dir():
         check_input_file(path, "give the path of a recording, a hand or a robot description")
     own = _own(path, units, fps) or _robot(path) or yaml_facts(path)

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 import tyro
 
 from mjx_hand.cli.file_facts import file_facts
+from mjx_hand.errors import in_one_line
 
 
 def info(
@@ -29,10 +30,10 @@ def info(
         units: m, cm, mm or in, where a marker file's own unit is wrong or missing.
     """
     found = file_facts(file, side, sequence, mano, fps, units)
-    print(f"{file}: {found.kind}")
+    print(in_one_line(f"{file}: {found.kind}"))
     width = max((len(label) for label, _ in found.facts), default=0)
     for label, text in found.facts:
-        print(f"  {label:<{width}}  {text}")
+        print(f"  {label:<{width}}  {in_one_line(text)}")
     for command in found.next:
         print(f"next: {command}")
     return 0 if found.sound else 1

@@ -1,5 +1,6 @@
 """The command `mjx-hand`: one file a subcommand beside this one, and those of other packages."""
 
+import functools
 import importlib
 import os
 import sys
@@ -9,6 +10,7 @@ from typing import Any
 import tyro
 
 from mjx_hand.cli.plugin_commands import plugin_commands, run_plugin, summary
+from mjx_hand.cli.terminal.usage import later, parsed
 from mjx_hand.cli.wording import as_options
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
@@ -17,7 +19,7 @@ COMMANDS = ("build", "fit", "info", "keypoints", "retarget", "robot", "track", "
 
 
 def _function(command: str) -> Callable[..., Any]:
-    return getattr(importlib.import_module(f"mjx_hand.cli.{command}"), command)
+    return later(getattr(importlib.import_module(f"mjx_hand.cli.{command}"), command))
 
 
 def _all_functions() -> dict[str, Callable[..., Any]]:
@@ -28,7 +30,7 @@ def _all_functions() -> dict[str, Callable[..., Any]]:
         def described() -> None: ...
 
         described.__doc__ = summary(point)
-        functions[name] = described
+        functions[name] = later(described)
     return functions
 
 
@@ -50,13 +52,18 @@ def main(argv: Sequence[str] | None = None) -> int:
             return run_plugin(plugin, argv[1:])
         enable_compile_cache()
         if argv and argv[0] in COMMANDS:  # one command's module alone: importing all of them takes a second
-            status = tyro.cli(_function(argv[0]), prog=f"mjx-hand {argv[0]}", args=argv[1:])
+            parse = functools.partial(tyro.cli, _function(argv[0]), prog=f"mjx-hand {argv[0]}", args=argv[1:])
         else:
-            status = tyro.extras.subcommand_cli_from_dict(_all_functions(), prog="mjx-hand", args=argv)
+            functions = _all_functions()
+            parse = functools.partial(tyro.extras.subcommand_cli_from_dict, functions, prog="mjx-hand", args=argv)
+        status = parsed(parse)()
     except InputError as error:
         print(f"mjx-hand: {as_options(str(error))}", file=sys.stderr)
         return 2
     except BrokenPipeError:  # whoever read the output has seen enough, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # Python flushes once more as it ends
         return 1
+    except OSError as error:  # a path that the system cannot use: too long a name, no permission, a full disk
+        print(f"mjx-hand: {InputError(error)}", file=sys.stderr)
+        return 2
     return status or 0

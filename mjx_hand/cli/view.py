@@ -60,6 +60,8 @@ def view(
     with serving(scene, port, host) as viewer:
         viewer.play()
         print(f"{recording}: open {viewer.url} in a browser; Ctrl-C here ends it", flush=True)
+        if viewer.public:
+            print(f"everybody who can reach this computer at {host}:{viewer.server.get_port()} can look and steer")
         viewer.wait()
 
 

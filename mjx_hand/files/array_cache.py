@@ -41,7 +41,7 @@ def cached(compute: Callable[[], Mapping[str, np.ndarray]], *ingredients: Any) -
     path = Path(cache) / _FOLDER / f"{_digest(ingredients)}.npz"
     if path.is_file():
         try:
-            arrays = load_arrays(path, SCHEMA)
+            arrays = dict(load_arrays(path, SCHEMA))  # all are read here, where damage is caught
         except InputError:  # damaged, as an archive's checksums tell: it is made anew
             pass
         else:

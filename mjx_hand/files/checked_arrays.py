@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from mjx_hand.errors import InputError
+from mjx_hand.files.npz_reader import Arrays
 
 Dimension = int | str
 # Lines of text. Not tuple[str, ...]: type checkers at run time look at an item of it that they draw by chance, which
@@ -16,7 +17,7 @@ Lines = tuple[Any, ...]
 
 def numbers(
     path: str | Path,
-    arrays: Mapping[str, np.ndarray],
+    arrays: Arrays,
     layout: Mapping[str, tuple[Dimension, ...]],
     *,
     finite: bool = True,
@@ -48,6 +49,8 @@ def numbers(
             expected = ", ".join(map(str, known))
             raise InputError(f"{path}: {name} has shape {value.shape}, expected ({expected})")
         sizes |= {d: n for d, n in zip(wanted, value.shape, strict=True) if isinstance(d, str)}
+        if value.dtype.kind == "f" and value.dtype.itemsize > 8:
+            value = value.astype(float)  # long doubles, which nothing here computes with
         if finite and not np.isfinite(value).all():
             where = tuple(int(i) for i in np.argwhere(~np.isfinite(value))[0])
             raise InputError(f"{path}: {name} has NaN or infinity, first at {where}; repair or leave out those frames")
@@ -55,17 +58,34 @@ def numbers(
     return found
 
 
-def texts(arrays: Mapping[str, np.ndarray], name: str) -> Lines:
-    """The strings of that name; none where it is missing."""
-    return tuple(str(each) for each in np.ravel(arrays[name])) if name in arrays else ()
-
-
-def text(path: str | Path, arrays: Mapping[str, np.ndarray], name: str) -> str:
+def text(path: str | Path, arrays: Arrays, name: str) -> str:
     """The string of that name.
 
     Raises:
-        InputError: it is missing.
+        InputError: it is missing, or is not one string.
     """
+    return _strings(path, arrays, name, 0).item()
+
+
+def texts(path: str | Path, arrays: Arrays, name: str, *, needed: bool = True) -> Lines:
+    """The list of strings of that name; none where it is missing and not `needed`.
+
+    Raises:
+        InputError: it is missing, or is not a list of strings.
+    """
+    if not needed and name not in arrays:
+        return ()
+    return tuple(_strings(path, arrays, name, 1).tolist())
+
+
+def _strings(path: str | Path, arrays: Arrays, name: str, ndim: int) -> np.ndarray:
     if name not in arrays:
         raise InputError(f"{path}: has no {name!r}")
-    return str(arrays[name])
+    value = np.asarray(arrays[name])
+    empty = value.shape == (0,)  # which NumPy takes for numbers
+    if not (value.dtype.kind == "U" or empty) or value.ndim != ndim:
+        raise InputError(
+            f"{path}: {name} holds {value.dtype} of shape {value.shape}, expected "
+            f"{'one text' if ndim == 0 else 'a list of texts'}"
+        )
+    return value

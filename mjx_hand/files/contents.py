@@ -6,23 +6,26 @@ what is not an array of numbers stays a record until `plain` is asked for it.
 
 import io
 import zipfile
-import zlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mjx_hand.errors import InputError
+from mjx_hand.errors import InputError, reason_of
 from mjx_hand.files import safe_pickle
 from mjx_hand.files.input_file import refuse_pointer
+from mjx_hand.files.npz_reader import Archive
 from mjx_hand.files.safe_tensor import is_tensor, tensor
 
 PICKLES = (".pkl", ".pickle", ".p")
 WHOLE = ""  # the name of a value that is not a dictionary of named ones
 
 
-def read_contents(path: Path) -> dict[str, Any]:
+def read_contents(path: Path) -> Mapping[str, Any]:
     """The named values in an `.npz`, or of the dictionary in an `.npy` or pickle; any other single value as `WHOLE`.
+
+    Those of an `.npz` are read when they are looked up.
 
     Nothing for other kinds of file, and for folders.
 
@@ -77,29 +80,22 @@ def plain(path: str | Path, name: str, value: Any) -> np.ndarray:
     except InputError:
         raise
     except Exception as error:  # a damaged value raises anything at all
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError(f"{path}: cannot read {name!r} ({reason}); get the file again from its publisher") from None
+        raise InputError(
+            f"{path}: cannot read {name!r} ({reason_of(error)}); get the file again from its publisher"
+        ) from None
 
 
 def _unpickled(data: bytes, where: str) -> Any:
     return safe_pickle.unpickle(data, where, "recording", "its publisher")
 
 
-def read_archive(path: Path) -> dict[str, Any]:
+def read_archive(path: Path) -> Mapping[str, Any]:
     """The named values in an `.npz`, whatever it is called; its objects, if it has any, as records.
 
     Raises:
-        InputError: it is damaged, or names what no recording needs.
+        InputError: not a readable archive, or a value that is looked up is damaged or names what no recording needs.
     """
-    try:
-        with zipfile.ZipFile(path) as archive:
-            members = [name for name in archive.namelist() if name.endswith(".npy")]
-            return {name[:-4]: unwrapped(_array(archive.read(name), f"{path}: {name[:-4]}")) for name in members}
-    except InputError:
-        raise
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error, KeyError, RuntimeError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError(f"{path}: not a readable .npz file ({reason})") from None
+    return Archive(path, lambda data, where: unwrapped(_unpickled(data, where)))
 
 
 def _array(data: bytes, where: str) -> Any:
@@ -112,6 +108,6 @@ def _array(data: bytes, where: str) -> Any:
         if not dtype.hasobject:
             stream.seek(0)
             return np.lib.format.read_array(stream, allow_pickle=False)
-    except (ValueError, OSError, EOFError, SyntaxError, MemoryError) as error:
-        raise InputError(f"{where}: not a readable .npy array ({str(error).splitlines()[0]})") from None
+    except Exception as error:  # damaged bytes raise anything at all
+        raise InputError(f"{where}: not a readable .npy array ({reason_of(error)}); copy it again") from None
     return _unpickled(stream.read(), where)

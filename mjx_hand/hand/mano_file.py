@@ -4,14 +4,14 @@ The files come from https://mano.is.tue.mpg.de under that site's licence. Nothin
 """
 
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from mjx_hand.errors import InputError
+from mjx_hand.errors import InputError, reason_of
 from mjx_hand.files import safe_pickle
 from mjx_hand.files.contents import read_archive
 from mjx_hand.files.input_file import refuse_pointer
@@ -46,10 +46,12 @@ def load_mano_file(path: str | Path, side: str = "right") -> HandModel:
             raise InputError(f"{path}: has no {key!r}; a MANO file has {', '.join(_KEYS)}")
         try:
             found = safe_pickle.array(values[key])
+            sound = bool((np.abs(found.astype(np.float64)) <= LARGEST).all())
+        except InputError:
+            raise
         except Exception as error:  # a damaged value raises anything at all
-            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise InputError(f"{path}: cannot read {key!r} ({reason}); copy the file again") from None
-        if not (np.abs(found.astype(np.float64)) <= LARGEST).all():
+            raise InputError(f"{path}: cannot read {key!r} ({reason_of(error)}); copy the file again") from None
+        if not sound:
             raise InputError(f"{path}: {key!r} has NaN, infinity or numbers beyond {LARGEST}; copy the file again")
         return found
 
@@ -88,7 +90,7 @@ def load_mano_file(path: str | Path, side: str = "right") -> HandModel:
 _KEYS = ("v_template", "f", "weights", "J_regressor", "kintree_table", "shapedirs", "posedirs", "hands_mean")
 
 
-def _values(path: Path) -> dict[str, Any]:
+def _values(path: Path) -> Mapping[str, Any]:
     if not path.is_file():
         what = "a folder" if path.is_dir() else "no such file"
         raise InputError(f"{path}: {what}; give a MANO .pkl or .npz, or leave it out to use the open hand")

@@ -1,6 +1,5 @@
 """`JointMotion`: a motion projected onto the 20 hinges of a rigid hand."""
 
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +8,7 @@ from jaxtyping import Bool, Float
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import Lines, numbers, text, texts
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
+from mjx_hand.files.npz_reader import Arrays
 from mjx_hand.hand.joints import HINGES, NUM_HINGES
 from mjx_hand.pytree import pytree, static
 
@@ -82,13 +82,13 @@ def load_joint_motion(path: str | Path) -> JointMotion:
     return joint_motion_of(path, a, text(path, a, "source"))
 
 
-def joint_motion_of(path: str | Path, arrays: Mapping[str, np.ndarray], source: str) -> JointMotion:
+def joint_motion_of(path: str | Path, arrays: Arrays, source: str) -> JointMotion:
     """The joint motion among a file's arrays, checked.
 
     Raises:
         InputError: arrays are missing, unsound, or made for another joint order.
     """
-    if tuple(arrays.get("joint_names", ())) != HINGES:
+    if "joint_names" not in arrays or texts(path, arrays, "joint_names") != HINGES:
         raise InputError(f"{path}: its joint names are not this version's; make it again from the recording")
     n = numbers(path, arrays, LAYOUT)
     fps, side = float(n["fps"]), text(path, arrays, "side")
@@ -105,5 +105,5 @@ def joint_motion_of(path: str | Path, arrays: Mapping[str, np.ndarray], source: 
         valid=n["valid"].astype(bool),
         side=side,
         source=source,
-        warnings=texts(arrays, "warnings"),
+        warnings=texts(path, arrays, "warnings", needed=False),
     )

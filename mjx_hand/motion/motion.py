@@ -159,7 +159,7 @@ def load_motion_file(path: str | Path) -> Motion:
             tip_offset=offsets.get("tip_offset"),
             side=text(path, a, "side"),
             source=text(path, a, "source"),
-            warnings=texts(a, "warnings"),
+            warnings=texts(path, a, "warnings", needed=False),
         ),
         name=str(path),
     )

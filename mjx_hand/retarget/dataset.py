@@ -6,17 +6,18 @@ of the same compiled function over all devices. Files are read a little ahead, s
 
 import dataclasses
 import os
-import re
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from mjx_hand.capture.load import load_motion
-from mjx_hand.errors import InputError
+from mjx_hand.errors import InputError, reason_of
+from mjx_hand.files.npz_archive import remove_leftovers
 from mjx_hand.motion import Motion, check_motion, save_joint_motion
 from mjx_hand.retarget.frames import CHUNK, HANDS
 from mjx_hand.retarget.hands import KinematicHands
+from mjx_hand.retarget.ledger import NAME as LEDGER
 from mjx_hand.retarget.ledger import Ledger, key_of
 from mjx_hand.retarget.options import RetargetOptions
 from mjx_hand.retarget.sequence import errors_of_many, plausible_angles, retarget_many
@@ -26,7 +27,6 @@ from mjx_hand.rigid.rigid_hand import RigidHand
 
 SUMMARY = "summary.csv"
 _AHEAD = 2  # recordings read while others are computed
-_TEMPORARY = re.compile(r"\.(?P<stem>.+)-[a-z0-9_]{8}\.npz")  # as `files.npz_archive.replacing` names them
 
 
 @dataclasses.dataclass(frozen=True)
@@ -184,12 +184,12 @@ def _size(source: Path) -> int:
 
 
 def _remove_leftovers(out: Path, items: Sequence[_Item]) -> None:
-    """Temporary files of outputs that a killed run was writing."""
-    outputs = {item.output for item in items}
-    for path in out.rglob(".*.npz"):
-        match = _TEMPORARY.fullmatch(path.name)
-        if match and path.with_name(f"{match['stem']}.npz") in outputs:
-            path.unlink(missing_ok=True)
+    """Temporary files that a killed run was writing."""
+    names: dict[Path, list[str]] = {out: [SUMMARY, LEDGER]}
+    for item in items:
+        names.setdefault(item.output.parent, []).append(item.output.name)
+    for folder, own in names.items():
+        remove_leftovers(folder, frozenset(own))
 
 
 def _read_ahead(
@@ -212,8 +212,8 @@ def _loaded(item: _Item, read: Callable[[Path], tuple[Motion, RigidHand]]) -> _L
     except InputError as error:
         return Outcome(item.file, FAILED, message=str(error))
     except Exception as error:  # a damaged file can make a library fail in any way; the others must go on
-        reason = (str(error).splitlines() or [""])[0]
-        return Outcome(item.file, FAILED, message=f"{item.source}: cannot be read ({type(error).__name__}: {reason})")
+        message = f"{item.source}: cannot be read ({type(error).__name__}: {reason_of(error)})"
+        return Outcome(item.file, FAILED, message=message)
 
 
 def _finished(batch: Sequence[_Loaded], options: RetargetOptions, ledger: Ledger) -> Iterator[tuple[_Item, Outcome]]:

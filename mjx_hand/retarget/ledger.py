@@ -40,11 +40,9 @@ class Ledger:
         self._lines: dict[str, dict[str, Any]] = {}
         if self._path.is_file():
             for line in self._path.read_text(errors="replace").splitlines():
-                try:
-                    entry = json.loads(line)
+                entry = _understood(line)
+                if entry is not None:
                     self._lines[entry["row"]["file"]] = entry
-                except (ValueError, TypeError, KeyError):
-                    continue  # torn by a kill
         # Written anew, so that what is appended does not continue a torn line.
         with replacing(self._path) as temporary:
             temporary.write_text("".join(json.dumps(entry) + "\n" for entry in self._lines.values()))
@@ -73,6 +71,21 @@ class Ledger:
                 file.write(json.dumps(entry) + "\n")
         except OSError as error:
             raise InputError(f"cannot write {self._path}: {os.strerror(error.errno or 0)}; make room there") from None
+
+
+def _understood(line: str) -> dict[str, Any] | None:
+    """The entry in a line; None where a kill has torn it, or someone else has written it."""
+    try:
+        entry = json.loads(line)
+        row = Outcome(**entry["row"])
+    except (ValueError, TypeError, KeyError, RecursionError):
+        return None
+    kinds = {name: type(value) for name, value in dataclasses.asdict(Outcome("", "")).items()}
+    sound = all(
+        isinstance(value, int | float if kinds[name] is float else kinds[name])
+        for name, value in dataclasses.asdict(row).items()
+    )
+    return entry if sound else None
 
 
 def _stamp(path: Path) -> list[int] | None:

@@ -66,7 +66,7 @@ def load_robot_motion(path: str | Path) -> RobotMotion:
         InputError: not such a file, or its arrays are not sound.
     """
     arrays = load_arrays(path, SCHEMA)
-    names = tuple(str(name) for name in np.atleast_1d(arrays.get("joint_names", ())))
+    names = texts(path, arrays, "joint_names")
     layout = {"fps": (), "angles": ("t", len(names)), "base_position": ("t", 3), "base_quaternion": ("t", 4)}
     n = numbers(path, arrays, {**layout, "valid": ("t",)})
     if not names or n["fps"] <= 0:
@@ -80,7 +80,7 @@ def load_robot_motion(path: str | Path) -> RobotMotion:
         joint_names=names,
         robot=text(path, arrays, "robot"),
         source=text(path, arrays, "source"),
-        warnings=texts(arrays, "warnings"),
+        warnings=texts(path, arrays, "warnings", needed=False),
     )
 
 

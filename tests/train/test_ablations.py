@@ -15,13 +15,14 @@ from train import ablations, experiments
 from train.ablations import Plan, plan, run
 from train.experiment.evaluate_seeds import POLICY, REPLAY, ZERO
 from train.learning.curve import Point
-from train.learning.run_folder import _settings, _told, run_folder
+from train.learning.run_folder import run_folder
 from train.ppo import _write_curve
 from train.reports.ablations_page import Ablation, ablation_table, write_ablations_page
 from train.reports.ablations_variants import UNCHANGED, VARIANTS
 from train.reports.evaluation_record import evaluation_fingerprint
 from train.reports.results_table import Experiment
 from train.settings.config import Config
+from train.settings.saved import settings_of
 from train.view import video
 
 NO_GRIP = next(variant for variant in VARIANTS if variant.name == "no grip")
@@ -49,7 +50,7 @@ def test_every_variant_changes_what_it_says_and_nothing_else():
     (unchanged,) = planned.variants[0][1]
     for variant, (config,) in planned.variants:
         said = {override.partition("=")[0] for override in variant.overrides}
-        now, before = _settings(_told(config)), _settings(_told(unchanged))
+        now, before = settings_of(config), settings_of(unchanged)
         assert {name for name in now if now[name] != before[name]} == said, variant.name
         assert bool(said) == (variant.learns and variant != UNCHANGED)
 

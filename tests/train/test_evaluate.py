@@ -17,12 +17,13 @@ from mjx_hand.view.video.renderer import RendererUnavailable
 from train import evaluate
 from train.evaluate import evaluate_and_write
 from train.experiment.evaluate_seeds import POLICY, REPLAY, ZERO, Results, evaluate_seeds, shared_folder
+from train.experiment.setup import chosen_checkpoint, settled
 from train.learning.checkpoint import load_checkpoint
 from train.learning.curve import Point
 from train.reports import evaluation_record
 from train.reports.evaluation_page import tables
 from train.reports.evaluation_record import cached_results
-from train.settings.config import Config
+from train.settings.config import Config, compose
 from train.view import video
 
 Trained = tuple[Path, list[Point]]
@@ -160,6 +161,40 @@ def test_what_was_evaluated_is_known_again_until_something_changes(
     assert cached_results(configs) == kept
     monkeypatch.setattr(evaluation_record, "version", lambda _: "another")
     assert cached_results(configs) is None
+
+
+def test_a_policy_is_not_scored_on_another_task(configs: list[Config], tmp_path):
+    config = configs[0]
+    changes = {
+        "task.grip_force": {"task": dataclasses.replace(config.task, grip_force=9.0)},
+        "data.trials": {"data": dataclasses.replace(config.data, trials=2)},
+        "ppo.policy_layers": {"ppo": dataclasses.replace(config.ppo, policy_layers=(8,))},
+    }
+    for option, change in changes.items():
+        with pytest.raises(InputError, match=f"holds a training with {option}="):
+            chosen_checkpoint(dataclasses.replace(config, **change), 0)
+    with pytest.raises(InputError, match="is a policy of 'tiny', now 'power'"):
+        chosen_checkpoint(dataclasses.replace(config, name="power"), 0)
+    with pytest.raises(InputError, match=r"seeds 4 and 7 were trained with other task\.grip_force"):
+        evaluate_seeds([config, dataclasses.replace(configs[1], **changes["task.grip_force"])])
+
+
+def test_the_command_takes_the_settings_of_the_run(trained: Trained, tiny: Config, tmp_path):
+    """Of its folder, or of the policy itself where it has left its folder."""
+    usual = compose([f"demonstrations={tiny.demonstrations}"])
+    wanted = (tiny.name, tiny.task, tiny.data, tiny.ppo.policy_layers)
+    shutil.copy(trained[0] / "best.npz", tmp_path / "moved.npz")
+    for place in ({"out": str(trained[0])}, {"checkpoint": str(tmp_path / "moved.npz")}):
+        found = settled(dataclasses.replace(usual, **place), [*place, "demonstrations"])
+        assert (found.name, found.task, found.data, found.ppo.policy_layers) == wanted
+    other = dataclasses.replace(usual, out=str(trained[0]))
+    task = dataclasses.replace(usual.task, grip_force=9.0)
+    with pytest.raises(InputError, match=r"holds a training with task\.grip_force=.*, now 9\.0; leave out that option"):
+        settled(dataclasses.replace(other, task=task), ["out", "task.grip_force"])
+    with pytest.raises(InputError, match=r"holds a training with name=tiny, now pinch"):
+        settled(other, ["out", "config"])
+    assert settled(dataclasses.replace(other, engine="mjx"), ["out", "engine"]).engine == "mjx"
+    assert settled(dataclasses.replace(other, out=str(tmp_path / "gone")), ["out"]).name == "pinch"
 
 
 def test_results_of_several_seeds_go_above_their_folders(tiny: Config):

@@ -18,9 +18,11 @@ from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from mjx_hand.progress import counter
 from train.experiment.setup import chosen_checkpoint, load_env, without_grip
-from train.learning.checkpoint import Checkpoint
+from train.learning.checkpoint import Checkpoint, load_checkpoint
 from train.learning.policy import deterministic_policy
+from train.learning.run_folder import BEST
 from train.settings.config import Config
+from train.settings.saved import differing, policy_settings
 
 HOLD = 5.0  # s after the demonstration, for the hold metric
 POLICY, ZERO, REPLAY = "policy", "zero residual", "demonstration alone"
@@ -48,6 +50,11 @@ def evaluate_seeds(configs: Sequence[Config], part: str = "heldout") -> dict[int
     """
     for config in configs:
         _check_trained(config)
+        if others := differing(policy_settings(configs[0]), policy_settings(config)):
+            raise InputError(
+                f"seeds {configs[0].seed} and {config.seed} were trained with other {', '.join(others)}; evaluate each "
+                "alone"
+            )
     env = load_env(configs[0], part)
     checkpoints = {config.seed: chosen_checkpoint(config, env.observation_size) for config in configs}
     objects = [demonstration.object for demonstration in env.demonstrations]
@@ -100,7 +107,9 @@ def shared_folder(configs: Sequence[Config]) -> Path:
 
 def _check_trained(config: Config) -> None:
     """Refuse a missing checkpoint before the environment is built."""
-    best = Path(config.out) / "best.npz"
+    best = Path(config.out) / BEST
+    if config.checkpoint:
+        load_checkpoint(config.checkpoint)
     if not config.checkpoint and not best.is_file():
         elsewhere = "" if config.out == f"outputs/{config.name}/seed{config.seed}" else f" out={config.out}"
         experiment = f"data.folder={config.data.folder}" if config.data.folder else f"config={config.name}"

@@ -1,6 +1,7 @@
 """What training, evaluation and play share: the experiment's demonstrations, its environments, and its policy."""
 
 import dataclasses
+from collections.abc import Collection
 from pathlib import Path
 
 from envs.demonstrations.load_env import env_of_set
@@ -8,11 +9,15 @@ from envs.demonstrations.load_set import is_divided
 from envs.evaluation.evaluate import Evaluation, evaluate
 from envs.evaluation.roll_out import make_roll_out
 from envs.evaluation.rollout import Rollouts
+from envs.scene import NUM_WRIST
 from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
+from mjx_hand.hand.joints import NUM_HINGES
 from train.learning.checkpoint import Checkpoint, load_checkpoint
-from train.learning.policy import deterministic_policy
+from train.learning.policy import check_policy, deterministic_policy
+from train.learning.run_folder import BEST
 from train.settings.config import Config
+from train.settings.saved import FILE, contradiction, policy_settings, read_settings, with_settings_of
 
 
 def load_env(config: Config, part: str) -> TrackingEnv:
@@ -32,19 +37,50 @@ def without_grip(env: TrackingEnv) -> TrackingEnv:
     return TrackingEnv(env.demonstrations, env.hands, env.engine.name, task)
 
 
-def chosen_checkpoint(config: Config, observation_size: int) -> Checkpoint:
-    """The checkpoint to evaluate: `checkpoint=FILE`, or the best of the experiment's folder.
+def chosen_path(config: Config) -> Path:
+    """The policy to evaluate: `checkpoint=FILE`, or the best of the experiment's folder."""
+    return Path(config.checkpoint) if config.checkpoint else Path(config.out) / BEST
+
+
+def settled(config: Config, given: Collection[str]) -> Config:
+    """The configuration with the settings of the run that it names, where the command line does not say others.
+
+    Args:
+        config: as composed.
+        given: the options that the command line gave.
 
     Raises:
-        InputError: there is none, or it was trained on other observations.
+        InputError: an option was given that contradicts the run's.
     """
-    path = Path(config.checkpoint) if config.checkpoint else Path(config.out) / "best.npz"
+    policy = chosen_path(config)
+    if (policy.parent / FILE).is_file():
+        return with_settings_of(config, read_settings(policy.parent / FILE), given, str(policy.parent))
+    if policy.is_file() and (settings := load_checkpoint(policy).settings):
+        return with_settings_of(config, settings, given, str(policy))
+    return config
+
+
+def chosen_checkpoint(config: Config, observation_size: int) -> Checkpoint:
+    """The checkpoint of `chosen_path`, if it is of this experiment's task, demonstrations and network.
+
+    Raises:
+        InputError: there is none, or it is of others.
+    """
+    path = chosen_path(config)
     checkpoint = load_checkpoint(path)
+    if checkpoint.experiment != config.name:
+        raise InputError(
+            f"{path}: is a policy of {checkpoint.experiment!r}, now {config.name!r}; give config="
+            f"{checkpoint.experiment}, or a policy of this experiment"
+        )
+    if checkpoint.settings and (refused := contradiction(str(path), checkpoint.settings, policy_settings(config))):
+        raise InputError(f"{refused}; use the options it was trained with, or train again")
     if checkpoint.observation_size != observation_size:
         raise InputError(
             f"{path}: reads {checkpoint.observation_size} observations, this task gives {observation_size}; "
             "use the task options it was trained with, or train again"
         )
+    check_policy(path, checkpoint.policy, config.ppo, observation_size, NUM_WRIST + NUM_HINGES)
     return checkpoint
 
 

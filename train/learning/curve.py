@@ -2,12 +2,14 @@
 
 import csv
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from mjx_hand.errors import InputError
 from train.settings.config import Config
 
+CURVE = "curve.csv"
 LEARNED = 0.95  # share of training demonstrations from which a policy counts as having learned
 
 
@@ -28,7 +30,7 @@ def load_curve(folder: str | Path) -> list[Point]:
     Raises:
         InputError: the file is not one that a training wrote.
     """
-    path = Path(folder) / "curve.csv"
+    path = Path(folder) / CURVE
     if not path.is_file():
         return []
     names = [field.name for field in dataclasses.fields(Point)]
@@ -36,8 +38,15 @@ def load_curve(folder: str | Path) -> list[Point]:
         with path.open() as file:
             rows = [{name: float(row[name]) for name in names} for row in csv.DictReader(file)]
         return [Point(**{**row, "steps": int(row["steps"])}) for row in rows]
-    except (KeyError, TypeError, ValueError):
-        raise InputError(f"{path}: not a learning curve; train again, with fresh=true") from None
+    except (KeyError, TypeError, ValueError, OverflowError, csv.Error, OSError):
+        raise InputError(
+            f"{path}: not a learning curve; delete it and give the training's command again, which writes it anew"
+        ) from None
+
+
+def points_of(notes: Mapping[str, Any]) -> list[Point]:
+    """The evaluations that a state's notes tell of."""
+    return [Point(**point) for point in notes["points"]]
 
 
 def is_finished(config: Config, points: Sequence[Point]) -> bool:

@@ -2,15 +2,19 @@
 
 import functools
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import flax
 import jax
+import numpy as np
 from brax.training.agents.ppo import networks
 from jaxtyping import Array, Float
 
 from mjx_hand.errors import InputError
 from train.settings.options import Ppo
+
+_KEY = jax.ShapeDtypeStruct((2,), np.uint32)  # a random key, where no parameters are drawn
 
 
 def network_factory(ppo: Ppo) -> Callable[..., networks.PPONetworks]:
@@ -43,6 +47,25 @@ def _check_flax(jax_version: tuple[int, ...], flax_version: str) -> None:
             f"flax {flax_version} does not run on jax {'.'.join(map(str, jax_version))}, which needs flax 0.12.12 or "
             "newer; install it with: pip install --upgrade flax"
         )
+
+
+def check_policy(path: str | Path, parameters: Any, ppo: Ppo, observation_size: int, action_size: int) -> None:
+    """Raise InputError unless parameters from a file are those of this network, all finite."""
+    made = network_factory(ppo)(observation_size, action_size)
+    wanted = {
+        jax.tree_util.keystr(place): leaf.shape
+        for place, leaf in jax.tree_util.tree_leaves_with_path(jax.eval_shape(made.policy_network.init, _KEY))
+    }
+    found = {jax.tree_util.keystr(place): leaf for place, leaf in jax.tree_util.tree_leaves_with_path(parameters)}
+    for name in sorted(wanted.keys() | found.keys()):
+        shape = found[name].shape if name in found else None
+        if shape != wanted.get(name):
+            raise InputError(
+                f"{path}: has {name} of shape {shape}, a network of ppo.policy_layers={list(ppo.policy_layers)} "
+                f"{wanted.get(name)}; give the layers it was trained with, or train again"
+            )
+        if not np.isfinite(np.asarray(found[name])).all():
+            raise InputError(f"{path}: {name} has NaN or infinity; train again")
 
 
 def deterministic_policy(

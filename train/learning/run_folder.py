@@ -2,83 +2,63 @@
 
 import contextlib
 import dataclasses
-import json
 import shutil
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from filelock import FileLock, Timeout
-from omegaconf import OmegaConf
 
-from envs.demonstrations.load_set import part_digest
 from mjx_hand.errors import InputError
-from mjx_hand.files.npz_archive import replacing
+from mjx_hand.files.npz_archive import remove_leftovers, replacing
+from train.learning.curve import CURVE, points_of
 from train.learning.training_state import load_run, save_run
 from train.settings.config import Config
 from train.settings.processes import is_first, wait_for_all
+from train.settings.saved import FILE, Settings, contradiction, read_settings, settings_of, write_settings
 
-# What may differ between a training and its continuation: places, and how long and how often.
-_FREE = (
-    "seeds",
-    "out",
-    "demonstrations",
-    "checkpoint",
-    "fresh",
-    "distributed",
-    "debug",
-    "play",
-    "checks",
-    "data.folder",
-    "device",
-    "ppo.num_updates",
-    "ppo.num_timesteps",
-)
-# What options were called in folders of older trainings.
-_RENAMED = {
-    "task.wrist_move": "task.residual_scale_wrist_position",
-    "task.wrist_turn": "task.residual_scale_wrist_rotation",
-    "task.finger": "task.residual_scale_fingers",
-    "task.position_sharpness": "task.reward_position_alpha",
-    "task.rotation_sharpness": "task.reward_rotation_alpha",
-    "task.lost_at": "task.termination_distance",
-    "task.lost_at_last": "task.termination_distance_last",
-    "task.mid_start": "task.random_start_prob",
-    "task.ahead": "task.lookahead",
-    "task.action_cost": "task.rewards.action",
-}
+BEST, LAST = "best.npz", "last.npz"
+_LOCK = "lock"
+_ADVICE = "choose another folder with out=FOLDER, or train anew in this one with fresh=true"
 
 
 @contextlib.contextmanager
 def run_folder(config: Config) -> Iterator["RunFolder"]:
     """`config.out`, made if absent, to this training alone until the context ends.
 
-    With `config.fresh` whatever an earlier training left to go on from is deleted.
+    With `config.fresh` whatever an earlier training left to go on from is deleted. A folder that was made here goes
+    again where the training is refused before it has a state.
 
     Raises:
         InputError: it cannot be written, another training is under way in it, or it holds one of other settings.
     """
-    path = Path(config.out)
-    folder = RunFolder(path)
-    with _alone_in(path):
-        if config.fresh and is_first():
-            for old in (folder.states, path / "tensorboard"):
-                shutil.rmtree(old, ignore_errors=True)
-        wait_for_all("run folder")
-        written = path / "config.yaml"
-        if folder.states.is_dir() and written.is_file():
-            _check_same(config, written)
+    folder = RunFolder(Path(config.out), settings_of(config))
+    with _gone_if_refused(folder), _alone_in(folder.path):
         if is_first():
-            with replacing(written) as temporary:
-                temporary.write_text(OmegaConf.to_yaml(OmegaConf.create(_told(config))))
+            if config.fresh:
+                for old in (folder.states, folder.path / "tensorboard"):
+                    shutil.rmtree(old, ignore_errors=True)
+            folder.clear()
+        wait_for_all("run folder")
+        if folder.states.is_dir() and (folder.path / FILE).is_file():
+            _check_same(folder)
+        if is_first():
+            with replacing(folder.path / FILE) as temporary:
+                write_settings(config, temporary)
         yield folder
 
 
 @dataclasses.dataclass(frozen=True)
 class RunFolder:
-    """Where a training keeps its files; `run_folder` opens it."""
+    """Where a training keeps its files; `run_folder` opens it.
+
+    Attributes:
+        path: of the folder.
+        settings: of the training, which every state must have been made with.
+    """
 
     path: Path
+    settings: Settings
 
     @property
     def states(self) -> Path:
@@ -86,12 +66,40 @@ class RunFolder:
         return self.path / "state"
 
     def load(self, template: Any) -> tuple[Any, dict[str, Any]] | None:
-        """The newest sound state and its notes, as `load_run`."""
-        return load_run(self.states, template)
+        """The newest sound state of these settings and its notes, as `load_run`."""
+        return load_run(self.states, template, self._check_notes)
 
     def save(self, steps: int, state: Any, notes: Mapping[str, Any]) -> None:
         """Keep a state, as `save_run`."""
-        save_run(self.states, steps, state, notes)
+        save_run(self.states, steps, state, {**notes, "settings": dict(self.settings)})
+
+    def clear(self) -> None:
+        """Delete what trainings that were killed were writing."""
+        remove_leftovers(self.path, (BEST, LAST, CURVE, FILE))
+        remove_leftovers(self.states)
+        remove_leftovers(self.path / "unstable")
+
+    def _check_notes(self, notes: Mapping[str, Any]) -> None:
+        if refused := contradiction("it", notes["settings"], self.settings):
+            raise InputError(refused)
+        numbers = [notes["seconds"], *(value for point in points_of(notes) for value in dataclasses.astuple(point))]
+        if not all(isinstance(number, int | float) for number in numbers):
+            raise InputError("its evaluations are no numbers")
+
+
+@contextlib.contextmanager
+def _gone_if_refused(folder: RunFolder) -> Iterator[None]:
+    made = [path for path in (folder.path, *folder.path.parents) if not path.exists()]
+    try:
+        yield
+    except InputError:
+        if made and not folder.states.is_dir() and is_first():
+            for name in (FILE, _LOCK):
+                (folder.path / name).unlink(missing_ok=True)
+            with contextlib.suppress(OSError):  # something else is in it by now
+                for path in made:
+                    path.rmdir()
+        raise
 
 
 @contextlib.contextmanager
@@ -100,7 +108,7 @@ def _alone_in(path: Path) -> Iterator[None]:
     if not is_first():
         yield
         return
-    lock = FileLock(path / "lock")
+    lock = FileLock(path / _LOCK)
     try:
         path.mkdir(parents=True, exist_ok=True)
         lock.acquire(blocking=False)
@@ -116,40 +124,12 @@ def _alone_in(path: Path) -> Iterator[None]:
         lock.release()
 
 
-def _check_same(config: Config, written: Path) -> None:
-    # An option that there was not yet when the folder was written had what is now its default.
-    saved = {_RENAMED.get(name, name): value for name, value in _settings(_read(written)).items()}
-    before, now = _settings(_told(Config())) | saved, _settings(_told(config))
-    differing = [name for name in sorted(before.keys() | now.keys()) if before.get(name) != now.get(name)]
-    if differing:
-        name = differing[0]
-        others = f" and {len(differing) - 1} more" if len(differing) > 1 else ""
-        raise InputError(
-            f"{written.parent} holds a training with {name}={before.get(name)}, now {now.get(name)}{others}; "
-            "choose another folder with out=FOLDER, or train anew in this one with fresh=true"
-        )
-
-
-def _told(config: Config) -> dict[str, Any]:
-    """All options as the file has them, lists for tuples, and what finished demonstrations hold, wherever they are."""
-    options = json.loads(json.dumps(dataclasses.asdict(config)))
-    if config.data.folder:
-        options["data"]["contents"] = part_digest(config.data.folder, "train")
-    return options
-
-
-def _read(path: Path) -> dict[str, Any]:
-    values = OmegaConf.to_container(OmegaConf.load(path))
-    if not isinstance(values, dict):
-        raise InputError(f"{path}: not a configuration; train anew with fresh=true")
-    return {str(name): value for name, value in values.items()}
-
-
-def _settings(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Dotted option to value, without those that may differ."""
-    flat: dict[str, Any] = {}
-    for name, value in values.items():
-        option = prefix + name
-        if option not in _FREE:
-            flat |= _settings(value, f"{option}.") if isinstance(value, Mapping) else {option: value}
-    return flat
+def _check_same(folder: RunFolder) -> None:
+    written = folder.path / FILE
+    try:
+        before = read_settings(written)
+    except InputError as error:  # it is written anew; each state says itself what it belongs to
+        print(f"damaged, so the settings in the states are used: {error}", flush=True)
+        return
+    if refused := contradiction(str(folder.path), before, folder.settings):
+        raise InputError(f"{refused}; {_ADVICE}")

@@ -1,22 +1,23 @@
 """The whole state of a training on disk, so that it goes on as if it had never been stopped.
 
-`out/state/STEPS.npz` (schema mjx-hand/run/1) holds every array of the learner and the evaluations so far. The last few
+`out/state/STEPS.npz` (schema mjx-hand/run/2) holds every array of the learner and the evaluations so far. The last few
 are kept, each with a digest of its contents: a damaged one is named and the one before it used.
 """
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import jax
 import numpy as np
 
-from mjx_hand.errors import InputError
+from mjx_hand.errors import InputError, reason_of
+from mjx_hand.files.checked_arrays import text
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 
-SCHEMA = "mjx-hand/run/1"
+SCHEMA = "mjx-hand/run/2"
 KEPT = 3
 
 
@@ -40,31 +41,48 @@ def save_run(folder: Path, steps: int, state: Any, notes: Mapping[str, Any]) -> 
     return path
 
 
-def load_run(folder: Path, template: Any) -> tuple[Any, dict[str, Any]] | None:
+def load_run(
+    folder: Path, template: Any, check: Callable[[Mapping[str, Any]], None] = lambda notes: None
+) -> tuple[Any, dict[str, Any]] | None:
     """State and notes of the newest sound file, or None where there is none yet.
 
     Args:
         folder: of the states.
         template: a pytree of the same structure, with shapes and types.
+        check: raises InputError for notes that are of another training.
 
     Raises:
-        InputError: files are there and none is sound, or the state is of another structure than the template.
+        InputError: files are there and none is sound, of this structure, and of this training.
     """
     faults = []
     for path in _files(folder):
         try:
-            arrays = load_arrays(path, SCHEMA)
-            digest = str(arrays.pop("digest", ""))
-            if digest != _digest(arrays):
-                raise InputError(f"{path}: its contents do not match its digest")
+            return _read(path, template, check)
         except InputError as error:
             faults.append(str(error))
             print(f"damaged, so the state before it is used: {error}", flush=True)
-            continue
-        return _filled(path, template, arrays), json.loads(str(arrays["notes"]))
     if faults:
-        raise InputError(f"no sound state in {folder} ({faults[0]}); train anew with fresh=true")
+        raise InputError(
+            f"no sound state in {folder} ({faults[0]}); train anew with fresh=true, or choose another folder with "
+            "out=FOLDER"
+        )
     return None
+
+
+def _read(path: Path, template: Any, check: Callable[[Mapping[str, Any]], None]) -> tuple[Any, dict[str, Any]]:
+    arrays = dict(load_arrays(path, SCHEMA))
+    digest = text(path, arrays, "digest")
+    del arrays["digest"]
+    if digest != _digest(arrays):
+        raise InputError(f"{path}: its contents do not match its digest")
+    try:
+        notes = json.loads(text(path, arrays, "notes"))
+        check(notes)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    except Exception as error:  # someone else's notes may be anything
+        raise InputError(f"{path}: its notes are not those of a training ({reason_of(error)})") from None
+    return _filled(path, template, arrays), notes
 
 
 def _files(folder: Path) -> list[Path]:
@@ -86,8 +104,8 @@ def _filled(path: Path, template: Any, arrays: Mapping[str, np.ndarray]) -> Any:
         if value is None or value.shape != wanted.shape or value.dtype != wanted.dtype:
             has = "nothing" if value is None else f"{value.dtype}{list(value.shape)}"
             raise InputError(
-                f"{path}: holds {has} for {name}, expected {wanted.dtype}{list(wanted.shape)}; it is of another "
-                "version or task: train anew with fresh=true, or choose another folder with out=FOLDER"
+                f"{path}: holds {has} for {name}, expected {wanted.dtype}{list(wanted.shape)}: it is of another "
+                "version or task"
             )
         found.append(value)
     return jax.tree_util.tree_unflatten(structure, found)
@@ -96,7 +114,7 @@ def _filled(path: Path, template: Any, arrays: Mapping[str, np.ndarray]) -> Any:
 def _digest(arrays: Mapping[str, np.ndarray]) -> str:
     content = hashlib.sha256()
     for name in sorted(arrays):
-        value = np.ascontiguousarray(arrays[name])
+        value = np.asarray(arrays[name])
         content.update(f"{name} {value.dtype} {value.shape}".encode())
         content.update(value.tobytes())
     return content.hexdigest()

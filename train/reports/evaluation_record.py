@@ -77,10 +77,10 @@ def cached_results(configs: Sequence[Config]) -> dict[str, Any] | None:
         return None
     try:
         summary = json.loads(path.read_text())
-    except ValueError:  # a file of someone else's: it is written anew
+    except (ValueError, RecursionError):  # a file of someone else's: it is written anew
         return None
     same = isinstance(summary, dict) and summary.get("made_of") == evaluation_fingerprint(configs)
-    return summary if same and summary["films"] else None
+    return summary if same and summary.get("films") else None
 
 
 def evaluation_fingerprint(configs: Sequence[Config]) -> str:

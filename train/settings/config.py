@@ -1,14 +1,16 @@
 """The typed configuration of an experiment, composed by Hydra from `configs/`, checked before anything is compiled."""
 
+import contextlib
 import dataclasses
 import difflib
+import io
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import hydra
+from hydra._internal.utils import get_args_parser
 from hydra.core.config_store import ConfigStore
-from hydra.errors import HydraException
 from omegaconf import DictConfig, ListConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
@@ -17,10 +19,13 @@ from envs.physics import ENGINES
 from envs.settings import from_dict
 from envs.task import Task
 from mjx_hand.compile_cache import enable_compile_cache
-from mjx_hand.errors import InputError
+from mjx_hand.errors import InputError, reason_of
 from train.settings.device import DEVICES, use_device
 from train.settings.options import Checks, Debug, Distributed, Play, Ppo
-from train.settings.overrides import completed
+from train.settings.overrides import completed, old_names, options_given
+
+_SEEDS = 2**31  # JAX's keys are made of 32 bits, with a sign
+Settled = Callable[["Config", Sequence[str]], "Config"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,6 +71,11 @@ class Config:
     def __post_init__(self):
         if self.engine not in ("auto", *ENGINES):
             raise InputError(f"engine is {self.engine!r}; valid: auto, {', '.join(ENGINES)}")
+        if not self.out.strip():
+            raise InputError("out is empty; give the folder to write to, such as out=outputs/pinch/seed0")
+        for seed in (self.seed, *self.seeds):
+            if not 0 <= seed < _SEEDS:
+                raise InputError(f"seed is {seed}; valid: 0 to {_SEEDS - 1}")
         if self.device not in DEVICES:
             raise InputError(f"device is {self.device!r}; valid: auto, {', '.join(DEVICES)}")
 
@@ -97,7 +107,9 @@ def _composed(overrides: Sequence[str]) -> DictConfig:
             for override in overrides:
                 _check_key(base, override.split("=", 1)[0].lstrip("+~"))
             return hydra.compose("train", list(overrides))
-    except (HydraException, OmegaConfBaseException) as error:
+    except InputError:
+        raise
+    except Exception as error:  # numbers and brackets that Python itself gives up on are not Hydra's own errors
         raise InputError(one_line(error)) from None
 
 
@@ -128,24 +140,39 @@ def to_config(composed: DictConfig) -> Config:
     """The composed configuration as checked dataclasses.
 
     Raises:
-        InputError: a value that cannot be used, or `seeds`, which are not one configuration.
+        InputError: a value that cannot be used, a reference (`${...}`) to nothing or to itself, or `seeds`, which are
+            not one configuration.
     """
     if composed.seeds:
         raise InputError(f"seeds is {list(composed.seeds)}, but this takes one seed; give it alone, such as seed=0")
-    return from_dict(Config, OmegaConf.to_container(composed, resolve=True, throw_on_missing=True))
+    try:
+        values = OmegaConf.to_container(composed, resolve=True, throw_on_missing=True)
+    except (OmegaConfBaseException, RecursionError) as error:
+        raise InputError(one_line(error)) from None
+    return from_dict(Config, values)
 
 
-def command(task: Callable[[Config], object]) -> None:
+def command(task: Callable[[Config], object], settled: Settled | None = None) -> None:
     """Run `task` with the configuration of this process's arguments; Hydra's own flags (`--cfg job`) work too.
 
     Input that cannot be used ends the process with one line and status 2.
+
+    Args:
+        task: what to do.
+        settled: makes of a composed configuration, and the options that were given, the one to use.
     """
-    _command(lambda composed: task(_on_device(to_config(composed))))
+    _command(lambda composed, given: task(_on_device(_settled(to_config(composed), given, settled))))
 
 
-def command_of_seeds(task: Callable[[Sequence[Config]], object]) -> None:
+def command_of_seeds(task: Callable[[Sequence[Config]], object], settled: Settled | None = None) -> None:
     """Like `command`, for a task that takes the configurations of several seeds (`seeds=[0,1,2]`)."""
-    _command(lambda composed: task([_on_device(config) for config in expand_seeds(composed)]))
+    _command(
+        lambda composed, given: task([_on_device(_settled(one, given, settled)) for one in expand_seeds(composed)])
+    )
+
+
+def _settled(config: Config, given: Sequence[str], settled: Settled | None) -> Config:
+    return config if settled is None else settled(config, given)
 
 
 def _on_device(config: Config) -> Config:
@@ -153,26 +180,42 @@ def _on_device(config: Config) -> Config:
     return config
 
 
-def _command(task: Callable[[DictConfig], object]) -> None:
+def _command(task: Callable[[DictConfig, Sequence[str]], object]) -> None:
+    arguments = sys.argv[1:]
+
     def job(composed: DictConfig) -> None:
         try:
-            task(composed)
+            task(composed, options_given(arguments))
         except InputError as error:
             refuse(error)
+        except OSError as error:  # a path that the system cannot use: too long a name, no permission, a full disk
+            refuse(InputError(error))
 
     _store_schema()
     enable_compile_cache()
-    arguments = sys.argv[1:]
-    if not any(argument.startswith("-") for argument in arguments):
-        try:
-            expand_seeds(_composed(arguments))
-        except InputError as error:
-            refuse(error)
+    for old, new in old_names(arguments).items():
+        print(f"train: {old} is called {new} now", file=sys.stderr)
     try:
+        _check_flags(arguments)
+        if not any(argument.startswith("-") for argument in arguments):
+            expand_seeds(_composed(arguments))
         sys.argv[1:] = completed(arguments)
     except InputError as error:
         refuse(error)
     hydra.main(version_base=None, config_path="pkg://configs", config_name="train")(job)()
+
+
+def _check_flags(arguments: Sequence[str]) -> None:
+    """Raise InputError for flags that Hydra does not have: it would print all of those that it has."""
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said):
+            get_args_parser().parse_args(list(arguments))
+    except SystemExit as end:
+        if not end.code:
+            raise
+        reason = (said.getvalue().strip().splitlines() or [""])[-1].partition("error: ")[2]
+        raise InputError(f"{reason or 'these flags are not known'}; options are written name=value") from None
 
 
 def refuse(error: InputError) -> None:
@@ -220,4 +263,5 @@ def one_line(error: Exception) -> str:
     """What Hydra or OmegaConf says, without its search paths and types; the cause says more than the wrapper."""
     text = str(error.__cause__ or error).split("Config search path")[0]
     lines = [line.strip().rstrip(":") for line in text.splitlines() if line.strip()]
-    return "; ".join(line for line in lines if not line.startswith(("object_type", "reference_type")))
+    shown = [line for line in lines if not line.startswith(("object_type", "reference_type"))]
+    return "; ".join(shown) or f"these options cannot be read ({reason_of(error)}); write them as name=value"

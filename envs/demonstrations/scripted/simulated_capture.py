@@ -22,6 +22,7 @@ from mjx_hand.capture.markers.marker_set import included_marker_set
 from mjx_hand.capture.simulation.off_axis import add_off_axis_rotation
 from mjx_hand.capture.simulation.simulate import simulate_markers
 from mjx_hand.errors import InputError
+from mjx_hand.files.checked_arrays import numbers
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 from mjx_hand.hand.model import HandModel
 from mjx_hand.motion.demonstration import Demonstration
@@ -36,6 +37,13 @@ from mjx_hand.retarget.sequence import retarget_sequence
 from mjx_hand.rigid.rigid_hand import RigidHand, joint_rotations, without_meshes
 
 TRUTH_SCHEMA = "mjx-hand/truth/1"
+_TRUTH_LAYOUT: dict[str, tuple[int | str, ...]] = {
+    "angles": ("t", 20),
+    "wrist_position": ("t", 3),
+    "wrist_quaternion": ("t", 4),
+    "object_pose": ("t", 7),
+    "shape": ("s",),
+}
 _PROJECTION = ("method", "axes", "refine")  # settings that concern the twin, not the recording
 
 
@@ -267,5 +275,9 @@ def save_truth(truth: Truth, path: str | Path) -> None:
 
 
 def load_truth(path: str | Path) -> Truth:
-    """Read what `save_truth` wrote."""
-    return Truth(**load_arrays(path, TRUTH_SCHEMA))
+    """Read what `save_truth` wrote.
+
+    Raises:
+        InputError: not such a file, or its arrays are not sound.
+    """
+    return Truth(**numbers(path, load_arrays(path, TRUTH_SCHEMA), _TRUTH_LAYOUT))

@@ -13,10 +13,11 @@ from jaxtyping import Float, Int
 
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import numbers
-from mjx_hand.files.npz_archive import open_arrays
+from mjx_hand.files.npz_archive import open_archive
 from mjx_hand.objects.mesh_file import read_mesh
 
 _LAYOUT: dict[str, tuple[int | str, ...]] = {"object_pose_objcam": ("t", 3, 4), "hand_cam_to_object_cam": (4, 4)}
+_WORST = 1e6  # condition of a movement's matrix; with metres beside cosines it is below a hundred
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,8 +65,11 @@ def load_object(recording: str | Path, mesh: str | Path) -> RecordedObject:
     Raises:
         InputError: a file is missing or damaged, or holds no object.
     """
-    n = numbers(recording, open_arrays(recording), _LAYOUT)
-    to_hand = np.linalg.inv(n["hand_cam_to_object_cam"].astype(float))
+    n = numbers(recording, open_archive(recording), _LAYOUT)
+    to_object = n["hand_cam_to_object_cam"].astype(float)
+    if not np.isfinite(np.linalg.cond(to_object)) or np.linalg.cond(to_object) > _WORST:
+        raise InputError(f"{recording}: hand_cam_to_object_cam is no movement of a camera; copy the recording again")
+    to_hand = np.linalg.inv(to_object)
     pose = np.einsum("ij,tjk->tik", to_hand[:3, :3], n["object_pose_objcam"].astype(float))
     pose[:, :, 3] += to_hand[:3, 3]
     vertices, faces = read_mesh(mesh)

@@ -1,5 +1,6 @@
 """The hands in one image, from the output of HaMeR, WiLoR or WiLoR-mini; `hamer` says what that is."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +15,7 @@ from mjx_hand.files.contents import plain, unwrapped
 
 Array = np.ndarray
 _PARAMETERS = ("global_orient", "hand_pose", "betas")
+_NAMES = (*_PARAMETERS, "right", "is_right", "pred_cam_t_full", "pred_keypoints_3d")  # of an archive no others are read
 _MIRROR = np.diag([-1.0, 1, 1])
 
 
@@ -31,13 +33,14 @@ class EstimatedHand:
         return np.concatenate([self.rotations.ravel(), self.shape, self.translation, self.joints.ravel()])
 
 
-def _parameters(entry: Any) -> dict[str, Any]:
+def _parameters(entry: Any) -> Mapping[str, Any]:
     """The named values of HaMeR's dictionary, its parameters among them; nothing where it is none."""
-    if not isinstance(entry, dict):
+    if not isinstance(entry, Mapping):
         return {}
     inner = unwrapped(entry.get("pred_mano_params"))
-    values = {**entry, **inner} if isinstance(inner, dict) else entry
-    return values if all(name in values for name in _PARAMETERS) else {}
+    places = [inner, entry] if isinstance(inner, dict) else [entry]
+    homes = {name: place for name in _NAMES for place in reversed(places) if name in place}
+    return {name: homes[name][name] for name in homes} if set(_PARAMETERS) <= homes.keys() else {}
 
 
 def is_list_of_hands(entry: Any) -> bool:
@@ -84,7 +87,7 @@ def _mini(where: str, entry: dict[str, Any]) -> list[EstimatedHand]:
     return _made(where, found, right, rotations[None], np.eye(3)[None])
 
 
-def _found(where: str, values: dict[str, Any]) -> dict[str, Array]:
+def _found(where: str, values: Mapping[str, Any]) -> dict[str, Array]:
     names = (*_PARAMETERS, "pred_cam_t_full", "pred_keypoints_3d")
     found = {name: plain(where, name, values[name]) for name in names if name in values}
     if "pred_cam_t_full" not in found:

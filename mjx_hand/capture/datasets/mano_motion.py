@@ -49,7 +49,7 @@ def frame_rate(path: Path, request: Request) -> float:
 
 
 def recorded(path: Path, *values: Array) -> Bool[Array, "t"]:
-    """Which frames have finite numbers in all of `values`, each (t, ...).
+    """Which frames have numbers that a hand's can be in all of `values`, each (t, ...): finite, and not huge.
 
     Raises:
         InputError: none has, or a number is no angle and no place.

@@ -8,7 +8,7 @@ one a point. One frame (n, 3) and flat rows (T, 3 n) are read too.
 """
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -68,7 +68,7 @@ def _shaped(value: Any) -> bool:
 
 
 def _recognises(arrays: Any) -> bool:
-    return isinstance(arrays, dict) and bool(_points_in(arrays))
+    return isinstance(arrays, Mapping) and bool(_points_in(arrays))
 
 
 def _read(path: Path, arrays: Any, unit: str | None) -> dict[str, KeypointRecording]:

@@ -90,7 +90,7 @@ def keypoint_contents(path: Path, known: Mapping[str, Any] | None = None) -> Any
         return None
     check_input_file(path, "give the path of a recording")
     if container == ARRAYS:
-        return dict(read_contents(path) if known is None else known)
+        return read_contents(path) if known is None else known
     return read_table(path) if container == TABLE else read_json(path)
 
 

@@ -91,7 +91,7 @@ def load_keypoint_file(path: str | Path) -> KeypointRecording:
         InputError: not such a file, or made for another order of keypoints.
     """
     a = load_arrays(path, SCHEMA)
-    if tuple(str(name) for name in np.atleast_1d(a.get("names", ()))) != KEYPOINTS:
+    if "names" not in a or texts(path, a, "names") != KEYPOINTS:
         raise InputError(f"{path}: its keypoints' names are not this version's; make it again from the recording")
     n = numbers(path, a, {"fps": (), "positions": ("t", NUM_KEYPOINTS, 3)}, finite=False)
     return check_keypoints(
@@ -101,6 +101,6 @@ def load_keypoint_file(path: str | Path) -> KeypointRecording:
             side=text(path, a, "side"),
             layout=text(path, a, "layout"),
             source=text(path, a, "source"),
-            warnings=texts(a, "warnings"),
+            warnings=texts(path, a, "warnings", needed=False),
         )
     )

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from mjx_hand.errors import InputError
-from mjx_hand.files.checked_arrays import Lines, texts
+from mjx_hand.files.checked_arrays import Lines, numbers, text, texts
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 from mjx_hand.pytree import pytree, replace, static
 
@@ -127,15 +127,14 @@ def load_recording_file(path: str | Path) -> MarkerRecording:
         InputError: not such a file, or its contents are not a well-formed recording.
     """
     a = load_arrays(path, SCHEMA)
-    try:
-        recording = MarkerRecording(
-            fps=float(a["fps"]),
-            positions=a["positions"],
-            visible=a["visible"].astype(bool),
-            names=tuple(str(n) for n in a["names"]),
-            source=str(a["source"]),
-            warnings=texts(a, "warnings"),
+    n = numbers(path, a, {"fps": (), "positions": ("t", "m", 3), "visible": ("t", "m")}, finite=False)
+    return check_recording(
+        MarkerRecording(
+            fps=float(n["fps"]),
+            positions=n["positions"],
+            visible=n["visible"].astype(bool),
+            names=texts(path, a, "names"),
+            source=text(path, a, "source"),
+            warnings=texts(path, a, "warnings", needed=False),
         )
-    except KeyError as error:
-        raise InputError(f"{path}: a marker file without {error.args[0]!r}") from None
-    return check_recording(recording)
+    )

@@ -2,8 +2,6 @@
 
 import contextlib
 import os
-import shutil
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,6 +10,7 @@ from jaxtyping import Float, Int
 
 from mjx_hand.errors import InputError
 from mjx_hand.files.npz_archive import followed
+from mjx_hand.files.working_folder import working_folder
 from mjx_hand.hand.joints import LINKS
 from mjx_hand.rigid.export.hulls import convex_hulls, hull_name
 from mjx_hand.rigid.rigid_hand import RigidHand
@@ -30,29 +29,23 @@ def filling(folder: str | Path) -> Iterator[Path]:
     """
     folder = followed(Path(folder))
     try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
         if folder.exists() and not folder.is_dir():
             raise InputError(f"{folder}: is a file; choose a folder")
-        temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}-"))
+        with working_folder(folder) as temporary:
+            yield temporary
+            umask = os.umask(0)
+            os.umask(umask)
+            temporary.chmod(0o777 & ~umask)  # mkdtemp makes private folders; give it the mode that mkdir() would
+            if not folder.exists():
+                temporary.rename(folder)
+                return
+            # Deepest first: a description is the last to appear, after the meshes that it names.
+            for path in sorted((p for p in temporary.rglob("*") if p.is_file()), key=lambda p: -len(p.parts)):
+                target = folder / path.relative_to(temporary)
+                target.parent.mkdir(parents=True, exist_ok=True)
+                path.replace(target)
     except OSError as error:
         raise InputError(f"cannot write {folder}: {error.strerror}; choose a folder that you may write to") from None
-    try:
-        yield temporary
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o777 & ~umask)  # mkdtemp makes private folders; give it the mode that mkdir() would
-        if not folder.exists():
-            temporary.rename(folder)
-            return
-        # Deepest first: a description is the last to appear, after the meshes that it names.
-        for path in sorted((p for p in temporary.rglob("*") if p.is_file()), key=lambda p: -len(p.parts)):
-            target = folder / path.relative_to(temporary)
-            target.parent.mkdir(parents=True, exist_ok=True)
-            path.replace(target)
-    except OSError as error:
-        raise InputError(f"cannot write {folder}: {error.strerror}; choose a folder that you may write to") from None
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
 
 
 def write_meshes(rigid: RigidHand, folder: Path, collision: str) -> None:

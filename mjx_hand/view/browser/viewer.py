@@ -2,7 +2,7 @@
 
 import contextlib
 import io
-import socket
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -14,6 +14,7 @@ from viser import uplot
 
 from mjx_hand.errors import InputError
 from mjx_hand.pytree import replace
+from mjx_hand.view.browser.gate import EVERYWHERE, free_port, guarded_server, is_public
 from mjx_hand.view.browser.nodes import Handle, Show, add_layer
 from mjx_hand.view.browser.playback import SPEEDS, Playback
 from mjx_hand.view.browser.scene import Scene, check_scene, positions
@@ -23,6 +24,7 @@ TICK = 1 / 40  # seconds between looks at the clock; more frames than that a bro
 _COLOURS = ("#3b6fb6", "#d1603d", "#4c9a6a", "#8a5fb0")
 _AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
 _PLANES = {"x": "yz", "y": "xz", "z": "xy"}
+_SPEEDS = {f"{speed:g}x": speed for speed in SPEEDS}
 
 
 class Viewer:
@@ -31,6 +33,7 @@ class Viewer:
     Attributes:
         scene: what is shown.
         server: viser's server, for more of one's own.
+        host: the address that it listens on.
         frame: the frame shown now.
         switches: the layers' checkboxes, in the scene's order.
     """
@@ -47,9 +50,10 @@ class Viewer:
             InputError: the scene cannot be shown, or the port is not free.
         """
         self.scene = check_scene(scene)
-        free = _free_port(host, port)
+        free = free_port(host, port)
         with contextlib.redirect_stdout(io.StringIO()):  # viser's banner; whoever asked for a viewer says where it is
-            self.server = viser.ViserServer(host=host, port=free, label="mjx-hand", verbose=False)
+            self.server = guarded_server(host, free, "mjx-hand")
+        self.host = host
         self.frame = 0
         self._playback: Playback | None = None
         self._lock = threading.RLock()
@@ -66,8 +70,14 @@ class Viewer:
 
     @property
     def url(self) -> str:
-        """Where to point a browser."""
-        return f"http://localhost:{self.server.get_port()}"
+        """Where to point a browser on this computer."""
+        here = "localhost" if self.host in EVERYWHERE or not self.public else self.host
+        return f"http://{here}:{self.server.get_port()}"
+
+    @property
+    def public(self) -> bool:
+        """Whether other computers can look, and steer, too."""
+        return is_public(self.host)
 
     def show(self, frame: int) -> None:
         """Show a frame; playing goes on from there."""
@@ -77,9 +87,15 @@ class Viewer:
                 self._playback = replace(self._playback, began=time.monotonic(), start=self.frame)
 
     def play(self, speed: float | None = None) -> None:
-        """Play from the frame shown, or from the first if it is the last; at `speed` times real time."""
+        """Play from the frame shown, or from the first if it is the last; at `speed` times real time.
+
+        Raises:
+            InputError: a speed that is none of `playback.SPEEDS`.
+        """
         with self._lock:
             if speed is not None:
+                if speed not in SPEEDS:
+                    raise InputError(f"speed is {speed}; valid: {', '.join(map(str, SPEEDS))}")
                 self._speed.value = f"{speed:g}x"
             start = 0 if self.frame == self.scene.num_frames - 1 else self.frame
             self._playback = Playback(
@@ -87,7 +103,7 @@ class Viewer:
                 fps=self.scene.fps,
                 began=time.monotonic(),
                 start=start,
-                speed=float(self._speed.value[:-1]),
+                speed=_SPEEDS[self._speed.value],
                 loop=self._loop.value,
             )
             self._button.label, self._button.icon = "Pause", viser.Icon.PLAYER_PAUSE
@@ -126,14 +142,21 @@ class Viewer:
     def _run(self) -> None:
         while not self._closed.wait(TICK):
             with self._lock:
-                if self._playback is None:
-                    continue
-                now = time.monotonic()
-                due = self._playback.frame(now)
-                if due != self.frame:
-                    self._draw(due)
-                if self._playback.over(now):
-                    self.pause()
+                try:
+                    self._tick()
+                except Exception as error:  # whatever went wrong in one frame, Play works for everybody afterwards
+                    self._playback = None
+                    print(f"mjx-hand: the viewer paused ({type(error).__name__}: {error})", file=sys.stderr)
+
+    def _tick(self) -> None:
+        if self._playback is None:
+            return
+        now = time.monotonic()
+        due = self._playback.frame(now)
+        if due != self.frame:
+            self._draw(due)
+        if self._playback.over(now):
+            self.pause()
 
     def _set_stage(self) -> None:
         """Lights, the ground, and where the camera begins."""
@@ -170,7 +193,7 @@ class Viewer:
         gui.add_markdown(f"**{self.scene.title}**  \n{last + 1} frames at {self.scene.fps:g}/s")
         self._slider = gui.add_slider("Frame", min=0, max=max(last, 1), step=1, initial_value=0, disabled=last == 0)
         self._button = gui.add_button("Play", icon=viser.Icon.PLAYER_PLAY, disabled=last == 0)
-        self._speed = gui.add_dropdown("Speed", [f"{speed:g}x" for speed in SPEEDS], initial_value="1x")
+        self._speed = gui.add_dropdown("Speed", list(_SPEEDS), initial_value="1x")
         self._loop = gui.add_checkbox("Loop", initial_value=True)
         self._time = gui.add_text("Time", "", disabled=True)
 
@@ -234,19 +257,6 @@ def serving(scene: Scene, port: int = PORT, host: str = "127.0.0.1") -> Iterator
         yield viewer
     finally:
         viewer.close()
-
-
-def _free_port(host: str, port: int) -> int:
-    """The port, or for 0 one that is free; viser would silently take another where it is not."""
-    if not 0 <= port <= 65535:
-        raise InputError(f"cannot serve at {host}:{port}: ports are 0 to 65535; choose another --port")
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, port))
-        except OSError as error:
-            raise InputError(f"cannot serve at {host}:{port}: {error.strerror}; choose another --port") from None
-        return probe.getsockname()[1]
 
 
 def _bounds(scene: Scene) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:

@@ -9,7 +9,7 @@ import pytest
 
 from mjx_hand.errors import InputError
 from mjx_hand.files.npz_archive import save_arrays
-from train.learning.checkpoint import SCHEMA, Checkpoint, load_checkpoint, save_checkpoint
+from train.learning.checkpoint import SCHEMA, Checkpoint, is_saved, load_checkpoint, save_checkpoint
 
 RNG = np.random.default_rng(0)
 
@@ -60,6 +60,40 @@ def test_what_is_saved_comes_back_exactly(tmp_path):
     assert [getattr(back, n) for n in scalars] == [getattr(saved, n) for n in scalars]
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("steps", np.zeros(3)),
+        ("steps", np.array("many")),
+        ("observation_size", np.array(np.nan)),
+        ("experiment", np.array(3)),
+        ("experiment", np.array(["a", "b"])),
+        ("settings", np.array("{")),
+        ("settings", np.array("[" * 100_000)),
+        ("settings", np.array("[1]")),
+        ("policy/params", np.zeros(2)),
+        ("policy/params/hidden_0/kernel", np.array("text")),
+        ("policy/params/hidden_0/kernel/below", np.zeros(2)),
+    ],
+)
+def test_members_of_other_kinds_are_refused(path, name, value):
+    with np.load(path) as file:
+        arrays = dict(file)
+    np.savez(path, **(arrays | {name: value}))
+    with pytest.raises(InputError):
+        load_checkpoint(path)
+
+
+def test_whether_a_file_holds_a_checkpoint_already(path):
+    kept = a_checkpoint()
+    assert not is_saved(kept, path), "its numbers are drawn anew"
+    save_checkpoint(kept, path)
+    assert is_saved(kept, path)
+    assert not is_saved(dataclasses.replace(kept, steps=1), path)
+    path.write_bytes(path.read_bytes()[:-1])
+    assert not is_saved(kept, path)
+
+
 def test_success_that_was_not_evaluated_stays_nan(tmp_path):
     save_checkpoint(a_checkpoint(success=float("nan")), tmp_path / "a.npz")
     assert np.isnan(load_checkpoint(tmp_path / "a.npz").success)
@@ -99,7 +133,7 @@ def test_files_of_another_kind_are_refused(tmp_path):
 
 def test_a_file_that_lacks_something_says_what(tmp_path):
     save_arrays(tmp_path / "a.npz", SCHEMA, {"steps": 1, "success": 0.5, "experiment": "pinch"})
-    with pytest.raises(InputError, match="without 'observation_size'"):
+    with pytest.raises(InputError, match="has no 'observation_size'"):
         load_checkpoint(tmp_path / "a.npz")
 
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import shutil
 import signal
 import subprocess
 import sys
@@ -143,6 +144,57 @@ def test_a_damaged_state_is_named_and_the_one_before_used(
         path.write_bytes(b"")
     with pytest.raises(InputError, match=r"no sound state in .*; train anew with fresh=true"):
         run(config, env)
+
+
+def test_what_was_lost_is_made_again_from_the_state(trained: Trained, tiny: Config, env: TrackingEnv, tmp_path):
+    config = in_folder(tiny, tmp_path)
+    run(config, env)
+    whole = {name: (tmp_path / name).read_bytes() for name in ("best.npz", "last.npz", "curve.csv")}
+    (tmp_path / "best.npz").unlink()
+    (tmp_path / "last.npz").write_bytes(whole["last.npz"][:100])
+    (tmp_path / "curve.csv").write_text("steps\nmany\n")
+    (tmp_path / "state" / ".000000000064-abcdefgh.npz").touch()  # as a kill leaves them
+    (tmp_path / ".last-abcdefgh.npz").touch()
+    run(config, env)
+    assert {name: (tmp_path / name).read_bytes() for name in whole} == whole
+    same_results(trained[0], tmp_path)
+    assert not list(tmp_path.rglob(".*"))
+
+
+def test_states_belong_to_their_settings(tiny: Config, env: TrackingEnv, tmp_path, capsys):
+    mine, other = in_folder(tiny, tmp_path / "0"), in_folder(tiny, tmp_path / "1", seed=1)
+    run(shortened(mine, 32), env)
+    run(other, env)
+    shutil.copy(tmp_path / "1" / "state" / "000000000064.npz", tmp_path / "0" / "state")
+    capsys.readouterr()
+    assert [p.steps for p in run(mine, env)] == [0, 32, 64]
+    said = capsys.readouterr().out
+    assert "holds a training with seed=1, now 0" in said
+    assert "going on from 32 steps" in said
+
+
+@pytest.mark.parametrize("content", [b"", b"3\n", b"\xff\x00\x93", b"a: &a [*a]\n", b"[" * 5000])
+def test_damaged_settings_are_written_anew(tiny: Config, env: TrackingEnv, tmp_path, content, capsys):
+    config = shortened(in_folder(tiny, tmp_path), 32)
+    run(config, env)
+    whole = (tmp_path / "config.yaml").read_text()
+    (tmp_path / "config.yaml").write_bytes(content)
+    with pytest.raises(InputError, match="seed=0, now 1"):
+        run(dataclasses.replace(config, seed=1), env)
+    (tmp_path / "config.yaml").write_bytes(content)
+    run(config, env)
+    assert "damaged, so the settings in the states are used" in capsys.readouterr().out
+    assert (tmp_path / "config.yaml").read_text() == whole
+
+
+def test_what_is_refused_leaves_no_folder(tiny: Config, tmp_path):
+    (tmp_path / "file").touch()
+    config = in_folder(tiny, tmp_path / "new" / "out", demonstrations=str(tmp_path / "file"))
+    with pytest.raises(InputError):
+        run(config)
+    with pytest.raises(InputError, match="'warp' is not installed"):
+        run(dataclasses.replace(config, engine="warp", demonstrations=str(tmp_path / "sets")))
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 def test_killed_at_once_it_goes_on(trained: Trained, tiny: Config, tmp_path):

@@ -34,6 +34,44 @@ def test_another_structure_is_refused(tmp_path):
         load_run(tmp_path, dict(TEMPLATE, c=jax.ShapeDtypeStruct((), np.float32)))
 
 
+def test_any_damage_falls_back_to_the_state_before(tmp_path):
+    """Bits of the archive's directory, cuts, and members of other shapes, whose checksums are right."""
+    save_run(tmp_path, 1, tree(1.0), {"points": []})
+    newest = save_run(tmp_path, 2, tree(2.0), {"points": []})
+    good = newest.read_bytes()
+    start = good.index(b"PK\x01\x02")
+    damaged = [good[:k] for k in range(0, len(good), 97)]
+    for bit in range(8 * start, 8 * len(good), 31):
+        flipped = bytearray(good)
+        flipped[bit // 8] ^= 1 << bit % 8
+        damaged.append(bytes(flipped))
+    with np.load(newest) as file:
+        arrays = dict(file)
+    for name, value in (("notes", arrays["notes"][None]), ("notes", np.array("{" * 100_000)), ("digest", np.zeros(2))):
+        np.savez(newest, **{**arrays, name: value})
+        damaged.append(newest.read_bytes())
+    for content in damaged:
+        newest.write_bytes(content)
+        state, _ = load_run(tmp_path, TEMPLATE) or (None, {})
+        assert isinstance(state, dict)
+        assert state["a"][0][0, 0] in (1.0, 2.0)
+        jax.tree.map(np.testing.assert_array_equal, state, tree(state["a"][0][0, 0]))
+
+
+def test_a_state_that_the_caller_does_not_know_is_passed_over(tmp_path):
+    def of_mine(notes):
+        if notes["seed"] != 0:
+            raise InputError(f"it is of seed {notes['seed']}")
+
+    save_run(tmp_path, 1, tree(1.0), {"seed": 0})
+    save_run(tmp_path, 2, tree(2.0), {"seed": 1})
+    _, notes = load_run(tmp_path, TEMPLATE, of_mine) or (None, {})
+    assert notes == {"seed": 0}
+    (tmp_path / "000000000001.npz").unlink()
+    with pytest.raises(InputError, match=r"no sound state .*it is of seed 1.*fresh=true"):
+        load_run(tmp_path, TEMPLATE, of_mine)
+
+
 def test_a_full_disk_leaves_the_state_before(tmp_path):
     save_run(tmp_path, 1, tree(1.0), {})
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}

@@ -39,6 +39,36 @@ def test_without_overrides_the_values_are_those_of_the_dataclasses():
     assert compose() == Config(out="outputs/pinch/seed0")
 
 
+@pytest.mark.parametrize(
+    "override",
+    [
+        "out=outputs/${nmae}/x",
+        "out=${out}",
+        "out=${oc.env:NO_SUCH_VARIABLE}",
+        "out=${oc.env:}",
+        "out=${",
+        "out=",
+        "out='  '",
+        "seed=-1",
+        f"seed={2**31}",
+        "seed=99999999999999999999",
+        f"seed={'9' * 5000}",
+        f"seeds={'[' * 900}",
+        f"ppo.policy_layers={'[' * 900}{']' * 900}",
+        f"task={{{'a: {' * 300}",
+    ],
+)
+def test_values_that_cannot_be_used_are_refused_in_a_line(override):
+    assert len(refusal(override)) < 1000
+
+
+def test_options_by_their_old_names_are_taken():
+    assert (
+        compose(["task.finger=0.9", "task.lost_at=0.2"]).task
+        == compose(["task.residual_scale_fingers=0.9", "task.termination_distance=0.2"]).task
+    )
+
+
 def test_what_is_composed_is_frozen_and_hashable():
     config = compose(["task.lookahead=[2,9]", "ppo.policy_layers=[32,16]", "ppo.value_layers=[8]"])
     assert (config.task.lookahead, config.ppo.policy_layers, config.ppo.value_layers) == ((2, 9), (32, 16), (8,))

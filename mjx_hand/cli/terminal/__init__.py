@@ -1,0 +1,1 @@
+"""How commands end on a terminal: wrong command lines and Ctrl-C in one line."""

@@ -1,0 +1,160 @@
+"""The settings that a run was made with, and whether others are the same.
+
+A run's folder holds them in `config.yaml`, and so does each of its states; a policy holds those that it cannot do
+without: what an episode is, the demonstrations, and the network. Told are dotted options and their values, as in
+`task.grip_force`.
+"""
+
+import dataclasses
+import json
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import Any
+
+from omegaconf import OmegaConf
+
+from envs.demonstrations.load_set import part_digest
+from envs.settings import from_dict
+from mjx_hand.errors import InputError
+from mjx_hand.files.safe_yaml import read_yaml
+from train.settings.config import Config
+from train.settings.overrides import RENAMED
+
+FILE = "config.yaml"
+# What may differ between a training and its continuation: places, and how long and how often.
+_FREE = (
+    "seeds",
+    "out",
+    "demonstrations",
+    "checkpoint",
+    "fresh",
+    "distributed",
+    "debug",
+    "play",
+    "checks",
+    "data.folder",
+    "device",
+    "ppo.num_updates",
+    "ppo.num_timesteps",
+)
+_PLACES = ("demonstrations", "data.folder")  # taken from the run all the same where nothing else is given
+_POLICY = ("name", "data", "task", "ppo.policy_layers")  # what a policy cannot do without
+_FREE_OF_POLICY = ("engine",)  # any engine may play it
+
+Settings = Mapping[str, Any]
+
+
+def settings_of(config: Config) -> Settings:
+    """What must be the same for a training to go on, and what the finished demonstrations hold, wherever they are."""
+    return {option: value for option, value in _told(config).items() if not _is(option, _FREE)}
+
+
+def policy_settings(config: Config) -> Settings:
+    """What must be the same for a policy to be scored."""
+    return {option: value for option, value in _told(config).items() if _is(option, _POLICY) and not _is(option, _FREE)}
+
+
+def differing(before: Settings, now: Settings) -> list[str]:
+    """The options that differ. One that there was not yet when `before` was written had what is now its default."""
+    usual = {option: value for option, value in settings_of(Config()).items() if option in now}
+    known = usual | {option: value for option, value in _renamed(before).items() if not _is(option, _FREE)}
+    return [option for option in sorted(known.keys() | now.keys()) if known.get(option) != now.get(option)]
+
+
+def contradiction(what: str, before: Settings, now: Settings) -> str:
+    """How settings differ from those of a training that `what` names, in one sentence; empty where they do not."""
+    options = differing(before, now)
+    if not options:
+        return ""
+    usual, others = settings_of(Config()), f" and {len(options) - 1} more" if len(options) > 1 else ""
+    was = _renamed(before).get(options[0], usual.get(options[0]))
+    return f"{what} holds a training with {options[0]}={was}, now {now.get(options[0])}{others}"
+
+
+def write_settings(config: Config, path: Path) -> None:
+    """Write all options as YAML, lists for tuples."""
+    options = json.loads(json.dumps(dataclasses.asdict(config)))
+    if config.data.folder:
+        options["data"]["contents"] = part_digest(config.data.folder, "train")
+    path.write_text(OmegaConf.to_yaml(OmegaConf.create(options)))
+
+
+def read_settings(path: Path) -> Settings:
+    """The options in a file of `write_settings`.
+
+    Raises:
+        InputError: it is damaged.
+    """
+    values = read_yaml(path)
+    if not isinstance(values, Mapping) or not {"name", "task", "ppo"} <= set(values):
+        raise InputError(f"{path}: not the settings of a training; write it again, or train anew with fresh=true")
+    return _renamed(_flat(values))
+
+
+def with_settings_of(config: Config, run: Settings, given: Collection[str], what: str) -> Config:
+    """The configuration with a run's settings for all that the command line does not say.
+
+    Args:
+        config: as composed, with defaults for what was not given.
+        run: the settings of the run.
+        given: the options that the command line gave.
+        what: the run, for messages.
+
+    Raises:
+        InputError: an option was given that contradicts the run's.
+    """
+    now = {option: value for option, value in _told(config).items() if option != "data.contents"}
+    if "config" in given:
+        given = {*given, "name"}
+    fixed = {o: v for o, v in now.items() if _is_given(o, given) and not _is(o, (*_FREE, *_FREE_OF_POLICY))}
+    if refused := contradiction(what, {o: v for o, v in run.items() if o in fixed}, fixed):
+        raise InputError(f"{refused}; leave out that option, or give the folder of another training with out=FOLDER")
+    kept = {
+        option: value
+        for option, value in run.items()
+        if option in now and not _is_given(option, given) and (_is(option, _PLACES) or not _is(option, _FREE))
+    }
+    try:
+        return from_dict(Config, _nested(now | kept))
+    except InputError:
+        raise
+    except Exception:  # a file that someone has edited
+        raise InputError(f"{what}: holds settings of the wrong types; write them again, or train anew") from None
+
+
+def _told(config: Config) -> dict[str, Any]:
+    options = _flat(json.loads(json.dumps(dataclasses.asdict(config))))
+    if config.data.folder:
+        options["data.contents"] = part_digest(config.data.folder, "train")
+    return options
+
+
+def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for name, value in values.items():
+        option = f"{prefix}{name}"
+        flat |= _flat(value, f"{option}.") if isinstance(value, Mapping) else {option: value}
+    return flat
+
+
+def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
+    values: dict[str, Any] = {}
+    for option, value in flat.items():
+        node = values
+        *parts, last = option.split(".")
+        for part in parts:
+            node = node.setdefault(part, {})
+        node[last] = value
+    return values
+
+
+def _renamed(settings: Settings) -> Settings:
+    return {RENAMED.get(option, option): value for option, value in settings.items()}
+
+
+def _is(option: str, names: Collection[str]) -> bool:
+    return any(option == name or option.startswith(f"{name}.") for name in names)
+
+
+def _is_given(option: str, given: Collection[str]) -> bool:
+    return _is(option, given) or (option == "seed" and "seeds" in given)
