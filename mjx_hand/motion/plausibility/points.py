@@ -56,7 +56,7 @@ def place_findings(points: Float[Array, "t n 3"], names: Sequence[str]) -> list[
     first, second = np.triu_indices(points.shape[1], 1)
     with np.errstate(invalid="ignore"):
         close = np.linalg.norm(points[:, first] - points[:, second], axis=-1) < SAME_PLACE
-    seen = np.isfinite(points).all(axis=-1).reshape(points.shape[:2]).any(axis=1)
+    seen = np.isfinite(points).all(axis=-1).sum(axis=-1) > 0
     if not close.any() or not seen.any():
         return []
     share = float(close[seen].any(axis=1).mean())
