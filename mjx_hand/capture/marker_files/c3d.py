@@ -46,7 +46,7 @@ def number_of_frames(header: C3DHeader, parameters: Parameters, content: bytes) 
     first, last = (_long(trial.get(f"ACTUAL_{end}_FIELD", [])) for end in ("START", "END"))
     said = list(header.frames)
     said += [last - first + 1] if first and last >= first else []
-    said += [int(point[name][0]) for name in ("LONG_FRAMES", "FRAMES") if _is_count(point.get(name))]
+    said += [int(count) for name in ("LONG_FRAMES", "FRAMES") if (count := _positive(point.get(name)))]
     size = max(header.frame_bytes, 1)
     there = len(content) - header.data
     # What is after the last frame fills up its block.
@@ -60,14 +60,10 @@ def number_of_frames(header: C3DHeader, parameters: Parameters, content: bytes) 
     return frames
 
 
-def _is_count(value: list | None) -> bool:
-    return (
-        value is not None
-        and len(value) > 0
-        and not isinstance(value[0], str)
-        and bool(np.isfinite(value[0]))
-        and value[0] > 0
-    )
+def _positive(values: list | None) -> float:
+    """The first of a parameter's values if it is a number above 0, else 0."""
+    first = values[0] if values else 0.0
+    return float(first) if not isinstance(first, str) and np.isfinite(first) and first > 0 else 0.0
 
 
 def frame_rate(header: C3DHeader, parameters: Parameters) -> tuple[float | None, tuple[str, ...]]:
@@ -75,10 +71,7 @@ def frame_rate(header: C3DHeader, parameters: Parameters) -> tuple[float | None,
 
     Then the one counts that the analog rate confirms, else POINT:RATE, as the manual has it.
     """
-    point, analog = (
-        float(value[0]) if (value := parameters.get(group, {}).get("RATE")) is not None and _is_count(value) else 0.0
-        for group in ("POINT", "ANALOG")
-    )
+    point, analog = (_positive(parameters.get(group, {}).get("RATE")) for group in ("POINT", "ANALOG"))
     rates = [rate for rate in (point, header.rate) if rate]
     if len(rates) < 2 or _same(*rates):
         return (rates[0] if rates else None), ()

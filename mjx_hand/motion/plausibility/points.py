@@ -55,8 +55,8 @@ def place_findings(points: Float[Array, "t n 3"], names: Sequence[str]) -> list[
     """On points that lie at one place, NaN where not seen."""
     first, second = np.triu_indices(points.shape[1], 1)
     with np.errstate(invalid="ignore"):
-        close = np.asarray(np.linalg.norm(points[:, first] - points[:, second], axis=-1) < SAME_PLACE)
-    seen = np.asarray(np.isfinite(points).all(axis=-1)).reshape(points.shape[:2]).any(axis=1)
+        close = np.linalg.norm(points[:, first] - points[:, second], axis=-1) < SAME_PLACE
+    seen = np.isfinite(points).all(axis=-1).sum(axis=-1) > 0
     if not close.any() or not seen.any():
         return []
     share = float(close[seen].any(axis=1).mean())
