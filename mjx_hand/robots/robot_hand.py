@@ -158,4 +158,5 @@ def _objective(kind: str, scaling: float, pairs: tuple[tuple[int, ...], ...]) ->
         human_origins=human_origins,
         human_tasks=human_tasks,
         free_base=kind == "position",
+        second_order=kind != "position",  # with a base that moves, positions are within reach
     )

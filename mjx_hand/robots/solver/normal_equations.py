@@ -81,6 +81,18 @@ def place(posture: Posture, tree: KinematicTree, objective: Objective) -> Placed
     return forward([posture.values[k] for k in range(tree.num_dofs)], tree, base_of(posture, objective))
 
 
+def objective_value(posture: Posture, targets: Targets, tree: KinematicTree, objective: Objective) -> Float[Array, "b"]:
+    """The objective at a posture, without smoothness."""
+    placed = place(posture, tree, objective)
+    loss = _component_loss if objective.kind == "position" else _vector_loss
+    value: Scalar = 0.0
+    for k, (origin, task) in enumerate(zip(objective.origins, objective.tasks, strict=True)):
+        residual = subtract(_vector(placed, origin, task), [targets.vectors[k, axis] for axis in range(3)])
+        part, *_ = loss(residual, targets.weights[k], jnp.asarray(objective.huber))
+        value = plus(value, part)
+    return jnp.broadcast_to(jnp.asarray(value), posture.values.shape[1:])
+
+
 def linearise(posture: Posture, targets: Targets, tree: KinematicTree, objective: Objective) -> Equations:
     """Value, gradient and Hessian (or, as the objective says, Gauss and Newton's part of it) at a posture."""
     like = posture.values[0]

@@ -14,11 +14,12 @@ from jaxtyping import Array, Bool, Float
 from mjx_hand.pytree import pytree, replace, static
 from mjx_hand.robots.solver.alignment import aligned
 from mjx_hand.robots.solver.kinematic_tree import HELD, KinematicTree, ancestors, tree_points
-from mjx_hand.robots.solver.normal_equations import Posture
+from mjx_hand.robots.solver.normal_equations import Posture, objective_value
 from mjx_hand.robots.solver.objectives import Objective, Targets
 
-COUNT = 256  # postures
+COUNT = 128  # postures
 _WIDTH = 0.12  # the errors' standard deviation, of the spread of a group's points
+_AS_NEAR = 1.5  # times the objective's value of a frame's own start, below which another start is taken
 _TURN = np.pi  # rad; the half range of a joint without limits
 
 
@@ -121,6 +122,25 @@ def placed(
 ) -> Posture:
     """These degrees of freedom, a base that moves where they fit the targets best."""
     return aligned(jnp.asarray(values), jax.tree.map(jnp.asarray, targets), tree, objective)
+
+
+@jax.jit
+def nearer_start(
+    own: Posture,
+    between: Float[Array | np.ndarray, "n b"],
+    targets: Targets,
+    tree: KinematicTree,
+    objective: Objective,
+) -> Posture:
+    """A frame's own start, or other degrees of freedom where these are as near to what it shows.
+
+    Those come from the frames around, and so go on as these do; where a hand changes faster than frames come they are
+    far away.
+    """
+    own, targets = jax.tree.map(jnp.asarray, (own, targets))
+    other = aligned(jnp.asarray(between), targets, tree, objective)
+    alone, joined = (objective_value(posture, targets, tree, objective) for posture in (own, other))
+    return jax.tree.map(lambda a, b: jnp.where(joined < _AS_NEAR * alone, a, b), other, own)
 
 
 @jax.jit

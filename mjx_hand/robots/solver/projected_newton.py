@@ -26,7 +26,7 @@ FLOOR = 0.02  # least pivot, of Gauss and Newton's stiffness
 _LEAST_STIFFNESS = 1e-6  # of an unknown that nothing holds
 LONGEST = 0.5  # rad or m; beyond it the objective's quadratic model says nothing
 _AT_LIMIT = 1e-6
-NEAR = 3e-4  # rad or m; a step shorter than that ends a search
+NEAR = 2e-3  # rad or m; a step shorter than that ends a search
 
 
 @pytree
