@@ -83,7 +83,9 @@ class ExportedPolicy:
                 x = x / (np.float32(1) + np.exp(-x))
         action = np.clip(x @ last.kernel + last.bias, np.float32(-1), np.float32(1))
         before = features[..., self.residual_place]
-        return action, np.float32(self.smoothing) * before + np.float32(1 - self.smoothing) * self.residual_scale * action
+        return action, np.float32(self.smoothing) * before + np.float32(
+            1 - self.smoothing
+        ) * self.residual_scale * action
 
     @property
     def digest(self) -> str:
@@ -109,9 +111,9 @@ def load_exported_policy(path: str | Path) -> ExportedPolicy:
     """
     arrays = load_arrays(path, SCHEMA)
     layers = sum(name.startswith("kernel") for name in arrays)
-    sizes = [f"h{k}" for k in range(layers)]
-    layout = {f"kernel{k}": (a, b) for k, (a, b) in enumerate(zip(["n", *sizes[:-1]], [*sizes[:-1], "a"], strict=False))}
-    layout |= {f"bias{k}": shape[1:] for k, shape in enumerate(list(layout.values()))}
+    sizes = ["n", *(f"h{k}" for k in range(1, layers)), "a"]
+    layout: dict[str, tuple[str, ...]] = {f"kernel{k}": (sizes[k], sizes[k + 1]) for k in range(layers)}
+    layout |= {f"bias{k}": (sizes[k + 1],) for k in range(layers)}
     layout |= {"offset": ("n",), "scale": ("n",), "residual_scale": ("a",)}
     found = numbers(path, arrays, {**layout, "limit": (), "residual_start": (), "smoothing": ()})
     try:
@@ -138,7 +140,9 @@ def _single(values: Sequence[float] | np.ndarray) -> np.ndarray:
 
 
 def _arrays(policy: ExportedPolicy) -> dict[str, np.ndarray]:
-    layers = {f"{name}{k}": getattr(layer, name) for k, layer in enumerate(policy.layers) for name in ("kernel", "bias")}
+    layers = {
+        f"{name}{k}": getattr(layer, name) for k, layer in enumerate(policy.layers) for name in ("kernel", "bias")
+    }
     return {
         **layers,
         **{name: _single(getattr(policy, name)) for name in ("offset", "scale", "residual_scale")},

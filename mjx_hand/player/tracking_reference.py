@@ -11,40 +11,40 @@ from mjx_hand.files.checked_arrays import Dimension, numbers, text
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 
 SCHEMA = "mjx-hand/tracking-reference/1"
-_LAYOUT: dict[str, tuple[Dimension, ...]] = {
-    "targets": ("t", 26),
-    "controls": ("t", 26),
-    "grip": ("t", 26),
-    "object_pose": ("t", 7),
-    "base": (3, 3),
-    "object_features": ("f",),
-    "start_qpos": (33,),
-    "start_qvel": (32,),
-    "low": (26,),
-    "high": (26,),
-    "rate": (),
-    "substeps": (),
+_COORDINATES = "wrist slides along the base's axes (m), wrist turns and hinges (rad)"
+
+
+@dataclasses.dataclass(frozen=True)
+class Field:
+    """What an array of the file holds."""
+
+    shape: tuple[Dimension, ...]
+    unit: str
+    frame: str
+    meaning: str
+
+
+FIELDS = {
+    "targets": Field(("t", 26), "m, rad", "base, joint", f"demonstrated: {_COORDINATES}"),
+    "controls": Field(("t", 26), "m, rad", "base, joint", "what to command for the step that ends at a frame"),
+    "grip": Field(("t", 26), "m, rad", "base, joint", "the share of the controls that presses the fingers"),
+    "object_pose": Field(("t", 7), "m, 1", "world", "demonstrated place and quaternion (wxyz) of the object"),
+    "base": Field(
+        (3, 3), "1", "world", "world_from_base of the wrist, whose orientation is base Rx Ry Rz of its turns"
+    ),
+    "object_features": Field(("f",), "m, kg, 1", "object", "size (3), mass, sliding friction, 1 for the kind"),
+    "start_qpos": Field((33,), "m, rad, 1", "base, joint, world", "the scene's qpos at frame 0"),
+    "start_qvel": Field((32,), "m/s, rad/s", "base, joint, world", "the scene's qvel at frame 0"),
+    "low": Field((26,), "m, rad", "base, joint", "least that an actuator may be told"),
+    "high": Field((26,), "m, rad", "base, joint", "most that an actuator may be told"),
+    "rate": Field((), "1/s", "-", "frames, and so control steps, a second"),
+    "substeps": Field((), "1", "-", "physics steps a control step"),
 }
 
 
 @dataclasses.dataclass(frozen=True)
 class TrackingReference:
-    """A demonstration of t frames; metres, radians, seconds, quaternions wxyz.
-
-    Attributes:
-        targets: demonstrated coordinates: the wrist's slides along the base's axes, its turns (R = base Rx Ry Rz), and
-            the hinges.
-        controls: what to command so that the controllers are at each target when its frame comes, and press.
-        grip: the share of the controls that presses.
-        object_pose: demonstrated, in the world.
-        base: world_from_base of the wrist.
-        object_features: size (m), mass (kg), friction, and 1 for its kind.
-        start_qpos, start_qvel: the scene's state at frame 0.
-        low, high: limits of what the actuators are told.
-        rate: frames, and so control steps, a second.
-        substeps: physics steps a control step.
-        scene: name of the MJCF file beside this one.
-    """
+    """A demonstration of t frames, as `FIELDS` tells; `scene` is the name of the MJCF file beside it."""
 
     targets: Float[np.ndarray, "t 26"]
     controls: Float[np.ndarray, "t 26"]
@@ -78,12 +78,12 @@ def load_tracking_reference(path: str | Path) -> TrackingReference:
         InputError: not such a file.
     """
     arrays = load_arrays(path, SCHEMA)
-    found = numbers(path, arrays, _LAYOUT)
+    found = numbers(path, arrays, {name: field.shape for name, field in FIELDS.items()})
     scene = text(path, arrays, "scene")
     if Path(scene).name != scene or not scene:
         raise InputError(f"{path}: its scene is {scene!r}, expected the name of a file beside it")
     return TrackingReference(
-        **{name: np.asarray(found[name]) for name, shape in _LAYOUT.items() if shape},
+        **{name: np.asarray(found[name]) for name, field in FIELDS.items() if field.shape},
         rate=float(found["rate"]),
         substeps=int(found["substeps"]),
         scene=scene,

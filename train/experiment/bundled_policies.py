@@ -1,5 +1,6 @@
 """Policies that come with the project, each with a demonstration to play; `tools.bundle_policy` adds one."""
 
+import dataclasses
 from pathlib import Path
 
 from envs.demonstrations.twin_hands import twins
@@ -25,3 +26,13 @@ def bundled_env(config: Config) -> TrackingEnv:
 def demonstration_path(name: str) -> Path:
     """Where the demonstration is that comes with this experiment's policy."""
     return FOLDER / f"{name}.demonstration.npz"
+
+
+def with_policy(config: Config) -> tuple[Config, bool]:
+    """The configuration with the policy to use: its own, or where nothing is trained, and one comes with the project,
+    that one; and whether it is that one."""
+    included = bundled_policy(config.name)
+    if config.checkpoint or included is None or (Path(config.out) / "best.npz").is_file():
+        return config, False
+    print(f"nothing is trained in {config.out}: taking the policy that comes with mjx-hand", flush=True)
+    return dataclasses.replace(config, checkpoint=str(included)), True

@@ -28,6 +28,7 @@ _FREE = (
     "distributed",
     "debug",
     "play",
+    "export",
     "checks",
     "data.folder",
     "device",
