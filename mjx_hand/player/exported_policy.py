@@ -70,7 +70,7 @@ class ExportedPolicy:
         features = np.asarray(features, np.float32)
         if features.shape[-1:] != self.offset.shape:
             raise InputError(
-                f"features have shape {features.shape}, this policy reads {self.offset.size}, as its contract lists them"
+                f"features have shape {features.shape}, this policy reads {self.offset.size}; its contract lists them"
             )
         if not np.isfinite(features).all():
             which = int(np.argwhere(~np.isfinite(features))[0][-1])

@@ -162,7 +162,7 @@ def _features(policy: ExportedPolicy, reference: TrackingReference) -> list[Feat
     kinds = len(policy.contract["object_kinds"])
     if reference.object_features.size != 5 + kinds:
         raise InputError(
-            f"the reference tells {reference.object_features.size} features of the object, the policy reads {5 + kinds}; "
+            f"the reference has {reference.object_features.size} features of the object, the policy reads {5 + kinds}; "
             "export both together"
         )
     return [known[entry["name"]] for entry in inputs]
