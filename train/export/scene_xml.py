@@ -47,7 +47,7 @@ def scene_xml(demonstration: Demonstration, hand: RigidHand) -> str:
 def exact_xml(spec: mujoco.MjSpec) -> str:
     """The spec as MJCF whose places, shapes, masses, limits and gains have all their digits.
 
-    MuJoCo's own writer rounds to six, after which a grasp takes another path.
+    MuJoCo's own writer rounds to six. Loaded, this is the same model to the last bit, and so are its steps.
     """
     model = spec.compile()
     root = ET.fromstring(spec.to_xml())
@@ -66,7 +66,7 @@ def exact_xml(spec: mujoco.MjSpec) -> str:
             if "mass" in element.attrib:
                 element.set("mass", repr(float(spec.geom(element.attrib["name"]).mass)))
     for element in root.iter("mesh"):
-        element.set("vertex", _text(spec.mesh(element.attrib["name"]).uservert))
+        element.set("vertex", _text(np.asarray(spec.mesh(element.attrib["name"]).uservert)))
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 
