@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-import mjx_hand
 from envs.observation import observed_features
 from envs.scene import TIMESTEP
 from envs.task import Task
@@ -21,7 +20,7 @@ from mjx_hand.rigid.gains import Gains
 from train.learning.checkpoint import Checkpoint
 
 SCHEMA = "mjx-hand/contract/1"
-_PACKAGES = ("jax", "brax", "flax", "mujoco", "numpy")
+_PACKAGES = ("mjx-hand", "jax", "brax", "flax", "mujoco", "numpy")
 _UNITS = ["m"] * len(WRIST_SLIDES) + ["rad"] * (len(WRIST_TURNS) + len(HINGES))
 
 
@@ -98,7 +97,6 @@ def make_contract(
         "demonstrations": [dict(demonstration) for demonstration in demonstrations],
         "parity": {"with": "Brax's inference", "inputs": 10_000, "largest_difference": difference},
         "versions": {
-            "mjx-hand": mjx_hand.__version__,
             "python": platform.python_version(),
             **{name: importlib.metadata.version(name) for name in _PACKAGES},
         },
