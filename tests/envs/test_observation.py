@@ -61,7 +61,7 @@ def step(env):
 @pytest.mark.parametrize(("demonstration", "frame"), [(0, 0), (1, 150), (1, 10**6)])
 def test_the_observation_is_its_formula(env, step, demonstration, frame):
     last = int(env.reference.length[demonstration]) - 1
-    start = env.start(jnp.asarray(demonstration), jnp.asarray(min(frame, last)))
+    start = jax.jit(env.start)(jnp.asarray(demonstration, jnp.int32), jnp.asarray(min(frame, last), jnp.int32))
     action = jnp.asarray(np.random.default_rng(0).uniform(-1, 1, 26), jnp.float32)
     for state in (start, step(start, action)):
         twin = state.pipeline_state
