@@ -21,6 +21,10 @@ from mjx_hand.motion.motion import Motion as Motion
 from mjx_hand.motion.motion import save_motion as save_motion
 from mjx_hand.objects.convex_decomposition import convex_pieces as convex_pieces
 from mjx_hand.objects.description import ObjectDescription as ObjectDescription
+from mjx_hand.player.exported_policy import ExportedPolicy as ExportedPolicy
+from mjx_hand.player.exported_policy import load_exported_policy as load_exported_policy
+from mjx_hand.player.play_policy import Played as Played
+from mjx_hand.player.play_policy import play_policy as play_policy
 from mjx_hand.projection.functional_axes import fit_functional_axes as fit_functional_axes
 from mjx_hand.projection.project import project as project
 from mjx_hand.retarget.dataset import retarget_dataset as retarget_dataset

@@ -26,6 +26,7 @@ FLOORS = (
     ("mjx_hand.hand",),
     ("mjx_hand.motion",),
     ("mjx_hand.objects",),
+    ("mjx_hand.player",),
     ("mjx_hand.hand.joints",),  # the order of all arrays
     ("mjx_hand.files",),
     ("mjx_hand.rotations", "mjx_hand.pytree", "mjx_hand.compile_cache", "mjx_hand.progress", "mjx_hand.plugins"),

@@ -6,12 +6,9 @@ with the project, on the demonstration beside it, where there is one. `play.unst
 diverged in training instead: the state before the step, and each physics step of it that the engine could make.
 """
 
-import dataclasses
-
-from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from mjx_hand.view.browser.viewer import Viewer
-from train.experiment.bundled_policies import bundled_env, bundled_policy
+from train.experiment.bundled_policies import bundled_env, with_policy
 from train.experiment.evaluate_seeds import median_and_worst
 from train.experiment.setup import chosen_path, load_env, rolled_out, settled
 from train.learning.checkpoint import load_checkpoint
@@ -49,7 +46,9 @@ def rollout_viewer(config: Config) -> Viewer:
     """
     if config.checkpoint:  # before anything is made for it
         load_checkpoint(chosen_path(config))
-    config, env = _env(config)
+    config, included = with_policy(config)
+    beside = included and config.play.demonstration is None
+    env = bundled_env(config) if beside else load_env(config, "heldout")
     _, rollouts, scores = rolled_out(config, env)
     errors = scores.scores["tracking_error_cm"]
     index = config.play.demonstration
@@ -61,16 +60,6 @@ def rollout_viewer(config: Config) -> Viewer:
     title = f"{config.name} {index}: {outcome}, {errors[index]:.2f} cm"
     scene = rollout_scene(env.demonstrations[index], rollouts, index, env.hands[index], title)
     return Viewer(scene, config.play.port)
-
-
-def _env(config: Config) -> tuple[Config, TrackingEnv]:
-    """The demonstrations to play, and the configuration with the policy to play them."""
-    included = bundled_policy(config.name)
-    if config.checkpoint or included is None or chosen_path(config).is_file():
-        return config, load_env(config, "heldout")
-    print(f"nothing is trained in {config.out}: playing the policy that comes with mjx-hand", flush=True)
-    config = dataclasses.replace(config, checkpoint=str(included))
-    return config, bundled_env(config) if config.play.demonstration is None else load_env(config, "heldout")
 
 
 def main(config: Config) -> None:

@@ -15,9 +15,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from jaxtyping import Array, Bool, Float, Float32, Int
 
-from envs.observation import OBSERVATION_LIMIT
 from envs.tracking import Tables, TrackingEnv, twin_of
 from mjx_hand.errors import InputError
+from mjx_hand.player.features import OBSERVATION_LIMIT
 
 Step = tuple[
     Float32[np.ndarray, "n o"], Float32[np.ndarray, "n"], Bool[np.ndarray, "n"], Bool[np.ndarray, "n"], dict[str, Any]

@@ -29,3 +29,7 @@ HINGES = tuple(
 NUM_HINGES = len(HINGES)  # 20
 # The link that each hinge moves: two hinges move the finger's first link, one each of the others.
 HINGE_LINKS = tuple(1 + 3 * f + k for f in range(5) for k in (0, 0, 1, 2))
+
+# Joints that carry the wrist of an actuated hand: slides along its base's axes, then turns, R = Rx Ry Rz.
+WRIST_SLIDES = ("wrist_x", "wrist_y", "wrist_z")
+WRIST_TURNS = ("wrist_roll", "wrist_pitch", "wrist_yaw")

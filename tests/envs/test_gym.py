@@ -14,9 +14,9 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatistics
 
 from envs.gym import TrackingVectorEnv
-from envs.observation import OBSERVATION_LIMIT
 from envs.task import Task
 from mjx_hand.errors import InputError
+from mjx_hand.player.features import OBSERVATION_LIMIT
 from tests.envs.conftest import SETTINGS
 
 WORLDS = 3

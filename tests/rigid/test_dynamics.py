@@ -12,8 +12,8 @@ import pinocchio  # pyright: ignore[reportMissingImports] (its wheel puts it whe
 import pytest
 import yourdfpy
 
-from mjx_hand.hand.joints import HINGE_LINKS, HINGES, LINKS, NUM_HINGES, PARENTS
-from mjx_hand.rigid.export.mjcf import WRIST_SLIDES, WRIST_TURNS, write_mjcf
+from mjx_hand.hand.joints import HINGE_LINKS, HINGES, LINKS, NUM_HINGES, PARENTS, WRIST_SLIDES, WRIST_TURNS
+from mjx_hand.rigid.export.mjcf import write_mjcf
 from mjx_hand.rigid.export.urdf import write_urdf
 from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics
 

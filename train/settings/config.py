@@ -21,7 +21,7 @@ from envs.task import Task
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError, reason_of
 from train.settings.device import DEVICES, use_device
-from train.settings.options import Checks, Debug, Distributed, Play, Ppo
+from train.settings.options import Checks, Debug, Distributed, Export, Play, Ppo
 from train.settings.overrides import completed, old_names, options_given
 
 _SEEDS = 2**31  # JAX's keys are made of 32 bits, with a sign
@@ -49,6 +49,7 @@ class Config:
         distributed: several processes.
         debug: help with what goes wrong.
         play: what to show.
+        export: what to write for other programs.
     """
 
     name: str = "pinch"
@@ -67,6 +68,7 @@ class Config:
     distributed: Distributed = dataclasses.field(default_factory=Distributed)
     debug: Debug = dataclasses.field(default_factory=Debug)
     play: Play = dataclasses.field(default_factory=Play)
+    export: Export = dataclasses.field(default_factory=Export)
 
     def __post_init__(self):
         if self.engine not in ("auto", *ENGINES):

@@ -5,6 +5,8 @@ import math
 
 from mjx_hand.errors import InputError
 
+FORMS = ("onnx", "npz", "c")  # of an exported policy
+
 
 @dataclasses.dataclass(frozen=True)
 class Ppo:
@@ -162,3 +164,26 @@ class Play:
             raise InputError(f"play.demonstration is {self.demonstration}; demonstrations are numbered from 0")
         if not 0 <= self.port <= 65535:
             raise InputError(f"play.port is {self.port}; valid: 0 to 65535")
+
+
+@dataclasses.dataclass(frozen=True)
+class Export:
+    """What `train.export` writes.
+
+    Attributes:
+        to: forms of the policy: onnx, npz, c. On that command's line `to=onnx` alone is enough.
+        folder: to write to; empty for `export` in `out`.
+        demonstrations: how many held-out demonstrations to write for players, the first ones; null for three, and for
+            a policy that comes with the project for the one that is beside it.
+    """
+
+    to: tuple[str, ...] = ("npz",)
+    folder: str = ""
+    demonstrations: int | None = None
+
+    def __post_init__(self):
+        unknown = [form for form in self.to if form not in FORMS]
+        if unknown or not self.to:
+            raise InputError(f"to is {','.join(unknown) or 'empty'}; valid: {', '.join(FORMS)}, or several: to=onnx,c")
+        if self.demonstrations is not None and self.demonstrations < 0:
+            raise InputError(f"export.demonstrations is {self.demonstrations}; give 0 for none, or how many")

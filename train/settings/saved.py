@@ -31,6 +31,7 @@ _FREE = (
     "distributed",
     "debug",
     "play",
+    "export",
     "checks",
     "data.folder",
     "device",

@@ -8,15 +8,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mjx_hand.errors import InputError
-from mjx_hand.hand.joints import FINGERS, HINGE_LINKS, HINGES, LINKS, PARENTS, TIP_LINKS
+from mjx_hand.hand.joints import FINGERS, HINGE_LINKS, HINGES, LINKS, PARENTS, TIP_LINKS, WRIST_SLIDES, WRIST_TURNS
 from mjx_hand.rigid.export.hulls import check_collision, convex_hulls, hull_name
 from mjx_hand.rigid.export.mesh_folder import MESHES, file_stem, filling, write_meshes
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand, axes_in_links
 
 BASES = ("fixed", "free", "actuated")
-WRIST_SLIDES = ("wrist_x", "wrist_y", "wrist_z")
-WRIST_TURNS = ("wrist_roll", "wrist_pitch", "wrist_yaw")
 VISUAL_GROUP, COLLISION_GROUP = 2, 3
 
 _SKIN = (0.86, 0.66, 0.55, 1.0)

@@ -12,10 +12,10 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from mjx_hand.hand.joints import FINGERS, HINGE_LINKS, HINGES, LINKS, PARENTS, TIP_LINKS
+from mjx_hand.hand.joints import FINGERS, HINGE_LINKS, HINGES, LINKS, PARENTS, TIP_LINKS, WRIST_SLIDES, WRIST_TURNS
 from mjx_hand.rigid.export.hulls import check_collision, hull_name
 from mjx_hand.rigid.export.mesh_folder import MESHES, file_stem, filling, write_meshes
-from mjx_hand.rigid.export.mjcf import WRIST_REACH, WRIST_SLIDES, WRIST_TURNS
+from mjx_hand.rigid.export.mjcf import WRIST_REACH
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand, axes_in_links
 

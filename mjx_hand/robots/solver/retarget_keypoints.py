@@ -198,7 +198,7 @@ def _key_frames(recording: Int[np.ndarray, "b"]) -> Int[np.ndarray, "k"]:
     """Every eighth frame of each recording, and its last."""
     count = np.arange(len(recording))
     begins = np.flatnonzero(np.diff(recording, prepend=-1))
-    rank = count - np.repeat(begins, np.diff([*begins, len(recording)]))
+    rank = count - np.repeat(begins, np.diff(np.append(begins, len(recording))))
     return np.flatnonzero((rank % STRIDE == 0) | (np.diff(recording, append=-1) != 0))
 
 

@@ -11,9 +11,9 @@ import yourdfpy
 from mujoco import mjx
 
 from mjx_hand.errors import InputError
-from mjx_hand.hand.joints import FINGERS, HINGES, LINKS
+from mjx_hand.hand.joints import FINGERS, HINGES, LINKS, WRIST_SLIDES, WRIST_TURNS
 from mjx_hand.rigid.export import mesh_folder
-from mjx_hand.rigid.export.mjcf import WRIST_SLIDES, WRIST_TURNS, hand_spec, write_mjcf
+from mjx_hand.rigid.export.mjcf import hand_spec, write_mjcf
 from mjx_hand.rigid.export.urdf import write_urdf
 from mjx_hand.rigid.gains import Gains
 

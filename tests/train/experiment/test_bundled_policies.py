@@ -36,7 +36,7 @@ def test_what_is_included_is_played_where_nothing_was_trained(
     capsys.readouterr()
     shown = viewer(untrained)
     shown.close()
-    assert "playing the policy that comes with mjx-hand" in capsys.readouterr().out
+    assert "taking the policy that comes with mjx-hand" in capsys.readouterr().out
     assert shown.scene.title.startswith("tiny 0: ")
     kept, best = load_checkpoint(bundled_policy("tiny") or ""), load_checkpoint(trained[0] / "best.npz")
     for layer in ("hidden_0", "mean_kernel"):

@@ -1,0 +1,1 @@
+"""An exported policy and what it needs to run: no JAX, only NumPy and MuJoCo."""

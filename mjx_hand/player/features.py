@@ -1,0 +1,248 @@
+"""What the policy sees, as a table of named features: the one place for their order, units, frames and scales.
+
+    observation = clip((features - offset) * scale, -5, 5)
+
+The environment evaluates the table on JAX arrays, the player on NumPy's; an export's contract is written from it. To
+add a feature, add a row. Its value uses operators and indexing alone, so that either kind of array does.
+
+Features are scaled by constants, not by running statistics: some hardly vary, and dividing by their tiny deviation
+makes PPO diverge.
+"""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from mjx_hand.hand.joints import FINGERS, HINGES, WRIST_SLIDES, WRIST_TURNS
+
+OBSERVATION_LIMIT = 5.0  # of an observation
+TARGETS = (*WRIST_SLIDES, *WRIST_TURNS, *HINGES)
+_XYZ = ("x", "y", "z")
+_PER_LENGTH = 30.0  # 1/m, for errors of the object: 3 cm
+
+
+@dataclasses.dataclass(frozen=True)
+class Seen:
+    """A world at a frame of a demonstration, and the demonstration there; metres, radians, seconds, wxyz.
+
+    Arrays of either kind. h is the number of frames that the policy sees ahead; past its end a demonstration's last
+    frame is held.
+
+    Attributes:
+        hand, hand_speed: (26,) coordinates and speeds of the wrist's slides and turns and of the hinges.
+        residual: (26,) the filtered residual so far.
+        object_pose: (7,) in the world.
+        object_speed: (6,) linear in the world, angular in the object's own axes.
+        object_turn: (3,) rotation vector, in the reference's own axes, that takes the reference's orientation to the
+            object's.
+        object_axes: (3, 3) world_from_object.
+        wrist_place, wrist_axes: (3,) and (3, 3) world_from_hand.
+        tips: (5, 3) finger tips in the world.
+        base: (3, 3) world_from_base of the scene's wrist.
+        target, grip: (26,) demonstrated coordinates, and the share of the controls that presses.
+        pose: (7,) demonstrated object.
+        first_pose: (7,) of the demonstration's first frame.
+        targets_ahead, poses_ahead: (h, 26) and (h, 7) demonstrated some frames ahead.
+        phase: (1,) share of the demonstration that is over.
+        object_features: size (m), mass (kg), friction, and 1 for the kind.
+    """
+
+    hand: Any
+    hand_speed: Any
+    residual: Any
+    object_pose: Any
+    object_speed: Any
+    object_turn: Any
+    object_axes: Any
+    wrist_place: Any
+    wrist_axes: Any
+    tips: Any
+    base: Any
+    target: Any
+    grip: Any
+    pose: Any
+    first_pose: Any
+    targets_ahead: Any
+    poses_ahead: Any
+    phase: Any
+    object_features: Any
+
+
+@dataclasses.dataclass(frozen=True)
+class Feature:
+    """Some numbers of an observation, all of one unit and frame.
+
+    Attributes:
+        name: unlike all others.
+        meaning: one line.
+        unit, frame: of the value.
+        elements: a name for each number, in order.
+        value: of what is seen; its numbers in row-major order.
+        scale: one over what it usually varies by, one number or one each.
+        offset: what it usually is.
+    """
+
+    name: str
+    meaning: str
+    unit: str
+    frame: str
+    elements: tuple[str, ...]
+    value: Callable[[Seen], Any]
+    scale: float | Sequence[float] | Float[np.ndarray, "n"] = 1.0
+    offset: float | Sequence[float] = 0.0
+
+    @property
+    def size(self) -> int:
+        """How many numbers."""
+        return len(self.elements)
+
+
+def feature_table(
+    residual_scale: Float[np.ndarray, "26"], lookahead: Sequence[int], object_kinds: Sequence[str]
+) -> tuple[Feature, ...]:
+    """The features in the observation's order.
+
+    Args:
+        residual_scale: what a residual of 1 is worth (m, rad).
+        lookahead: frames ahead that are seen.
+        object_kinds: names of the kinds of objects.
+    """
+    relative_to = "relative to the demonstrated"
+    return (
+        *_of_targets("error", f"coordinate {relative_to} one", lambda s: s.hand - s.target, (50.0, 5.0, 5.0)),
+        *_of_targets("speed", "speed", lambda s: s.hand_speed, (5.0, 0.5, 0.2), per="/s"),
+        *_of_targets("residual", "filtered residual so far", lambda s: s.residual, 1 / residual_scale),
+        Feature("grip", "share of the controls that presses", "rad", "joint", HINGES, lambda s: s.grip[6:], 5.0),
+        Feature(
+            "object_position_error",
+            f"object's place {relative_to} one",
+            "m",
+            "base",
+            _XYZ,
+            lambda s: s.base.T @ (s.object_pose[:3] - s.pose[:3]),
+            _PER_LENGTH,
+        ),
+        Feature(
+            "object_rotation_error",
+            "rotation vector from the demonstrated orientation to the object's",
+            "rad",
+            "demonstrated object",
+            _XYZ,
+            lambda s: s.object_turn,
+            3.0,
+        ),
+        Feature(
+            "object_velocity", "object's velocity", "m/s", "base", _XYZ, lambda s: s.base.T @ s.object_speed[:3], 3.0
+        ),
+        Feature("object_angular_velocity", "object's", "rad/s", "object", _XYZ, lambda s: s.object_speed[3:], 0.2),
+        Feature(
+            "object_in_hand",
+            "object's place seen from the wrist",
+            "m",
+            "hand",
+            _XYZ,
+            lambda s: s.wrist_axes.T @ (s.object_pose[:3] - s.wrist_place),
+            10.0,
+            (-0.1, -0.05, 0.03),  # about where a grasped object is
+        ),
+        Feature(
+            "tips_in_object",
+            "finger tips seen from the object",
+            "m",
+            "object",
+            tuple(f"{finger}_{axis}" for finger in FINGERS for axis in _XYZ),
+            lambda s: (s.tips - s.object_pose[:3]) @ s.object_axes,
+            _PER_LENGTH,
+        ),
+        *(feature for k, ahead in enumerate(lookahead) for feature in _of_frame_ahead(k, ahead)),
+        *(_of_object_ahead(k, ahead) for k, ahead in enumerate(lookahead)),
+        Feature("phase", "share of the demonstration that is over", "1", "-", ("share",), lambda s: s.phase, 2.0, 0.5),
+        Feature(
+            "object_rise",
+            "object's height above that of the demonstration's first frame",
+            "m",
+            "world",
+            ("z",),
+            lambda s: s.object_pose[2:3] - s.first_pose[2:3],
+            10.0,
+        ),
+        Feature(
+            "object_size",
+            "half extents of a box; radius, half height of a cylinder or capsule; radius of a sphere; reach of a mesh",
+            "m",
+            "object",
+            _XYZ,
+            lambda s: s.object_features[:3],
+            30.0,
+        ),
+        Feature("object_mass", "object's mass", "kg", "-", ("mass",), lambda s: s.object_features[3:4], 5.0),
+        Feature("object_friction", "sliding friction", "1", "-", ("friction",), lambda s: s.object_features[4:5]),
+        Feature("object_kind", "1 for its kind", "1", "-", tuple(object_kinds), lambda s: s.object_features[5:]),
+    )
+
+
+def offsets_and_scales(table: Sequence[Feature]) -> tuple[Float[np.ndarray, "o"], Float[np.ndarray, "o"]]:
+    """What is taken off each number, and what the rest is multiplied by."""
+    offset, scale = (
+        np.concatenate([np.broadcast_to(np.asarray(getattr(f, name), float), f.size) for f in table])
+        for name in ("offset", "scale")
+    )
+    return offset, scale
+
+
+def _of_targets(
+    name: str,
+    meaning: str,
+    value: Callable[[Seen], Any],
+    scales: Sequence[float] | Float[np.ndarray, "26"],
+    per: str = "",
+) -> tuple[Feature, Feature, Feature]:
+    """Rows for 26 coordinates of the hand: slides along the base's axes, turns from it, hinges.
+
+    Args:
+        name, meaning: of the rows.
+        value: all 26.
+        scales: of the three rows, or of all 26.
+        per: end of the unit.
+    """
+    parts = (
+        ("wrist_position", f"m{per}", "base", slice(0, 3)),
+        ("wrist_rotation", f"rad{per}", "joint", slice(3, 6)),
+        ("hinges", f"rad{per}", "joint", slice(6, 26)),
+    )
+    return tuple(  # type: ignore[return-value]
+        Feature(
+            f"{name}.{part}",
+            f"{part.replace('_', ' ')}: {meaning}",
+            unit,
+            frame,
+            TARGETS[place],
+            lambda s, place=place: value(s)[place],
+            scales[place] if len(scales) == len(TARGETS) else scales[k],
+        )
+        for k, (part, unit, frame, place) in enumerate(parts)
+    )
+
+
+def _of_frame_ahead(k: int, ahead: int) -> tuple[Feature, ...]:
+    return _of_targets(
+        f"ahead_{ahead}",
+        f"demonstrated coordinate {ahead} frames ahead, relative to the one now",
+        lambda s: s.targets_ahead[k] - s.target,
+        (50.0, 5.0, 5.0),
+    )
+
+
+def _of_object_ahead(k: int, ahead: int) -> Feature:
+    return Feature(
+        f"ahead_{ahead}.object_position",
+        f"demonstrated place of the object {ahead} frames ahead, relative to the one now",
+        "m",
+        "base",
+        _XYZ,
+        lambda s: s.base.T @ (s.poses_ahead[k, :3] - s.pose[:3]),
+        _PER_LENGTH,
+    )

@@ -1,0 +1,1 @@
+"""Policies for other programs: ONNX, NumPy or C, with a contract, and scenes and references to play them in."""

@@ -1,0 +1,144 @@
+"""The contract of an exported policy: every input and output, the body, the demonstrations, versions, digest."""
+
+import importlib.metadata
+import platform
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from envs.observation import observed_features
+from envs.scene import TIMESTEP
+from envs.task import Task
+from mjx_hand.hand.joints import HINGES, WRIST_SLIDES, WRIST_TURNS
+from mjx_hand.objects.description import OBJECT_KINDS
+from mjx_hand.player.exported_policy import ExportedPolicy
+from mjx_hand.player.features import OBSERVATION_LIMIT, TARGETS, Feature
+from mjx_hand.player.tracking_reference import FIELDS
+from mjx_hand.player.tracking_reference import SCHEMA as REFERENCE_SCHEMA
+from mjx_hand.rigid.gains import Gains
+from train.learning.checkpoint import Checkpoint
+
+SCHEMA = "mjx-hand/contract/1"
+_PACKAGES = ("mjx-hand", "jax", "brax", "flax", "mujoco", "numpy")
+_UNITS = ["m"] * len(WRIST_SLIDES) + ["rad"] * (len(WRIST_TURNS) + len(HINGES))
+
+
+def make_contract(
+    policy: ExportedPolicy,
+    checkpoint: Checkpoint,
+    task: Task,
+    difference: float,
+    demonstrations: Sequence[Mapping[str, Any]],
+) -> dict[str, Any]:
+    """What `contract.json` holds.
+
+    Args:
+        policy: as exported.
+        checkpoint: that it was made from.
+        task: that it was trained on.
+        difference: largest, of an action from Brax's inference.
+        demonstrations: what each that is written beside it is.
+    """
+    table = observed_features(task)
+    starts = np.cumsum([0, *(feature.size for feature in table)])[:-1].tolist()
+    return {
+        "schema": SCHEMA,
+        "policy": {
+            "experiment": checkpoint.experiment,
+            "steps": checkpoint.steps,
+            "success": checkpoint.success if np.isfinite(checkpoint.success) else None,
+            "layers": [layer.bias.size for layer in policy.layers],
+            "activation": "swish, the last layer linear",
+            "precision": "float32",
+            "digest": policy.digest,
+        },
+        "function": {
+            "scaled": "clip((features - offset) * scale, -limit, limit)",
+            "action": "clip(network(scaled), -1, 1)",
+            "residual": "smoothing * features[residual] + (1 - smoothing) * residual_scale * action",
+            "command": "clip(controls[min(frame + 1, last frame)] + residual, low, high), held for the whole step",
+            "limit": OBSERVATION_LIMIT,
+            "smoothing": task.smoothing,
+            "residual_scale": [float(value) for value in policy.residual_scale],
+            "residual_start": policy.residual_start,
+            "not_finite": "features must be finite: C returns 1 + the feature's number, Python raises InputError",
+        },
+        "rate": {"control_hz": 1 / (TIMESTEP * task.substeps), "substeps": task.substeps, "physics_step_s": TIMESTEP},
+        "lookahead": list(task.lookahead),
+        "object_kinds": list(OBJECT_KINDS),
+        "inputs": [_input(feature, start) for feature, start in zip(table, starts, strict=True)],
+        "outputs": [
+            {"name": "action", "size": len(TARGETS), "unit": "1", "frame": "joint", "elements": list(TARGETS)},
+            {
+                "name": "residual",
+                "size": len(TARGETS),
+                "unit": _UNITS,
+                "frame": "slides: base; turns and hinges: joint",
+                "elements": list(TARGETS),
+            },
+        ],
+        "conventions": {
+            "quaternions": "wxyz",
+            "world": "z up, the table at z = 0",
+            "base": "where a demonstration's wrist orientation starts; the wrist's slides run along its axes",
+            "hand": "the wrist's body: MANO's axes, origin in the wrist joint",
+            "wrist": "world_from_hand = base Rx(roll) Ry(pitch) Rz(yaw)",
+        },
+        "body": _body(demonstrations),
+        "demonstration_format": {
+            "schema": REFERENCE_SCHEMA,
+            "arrays": {
+                name: {"shape": list(field.shape), "unit": field.unit, "frame": field.frame, "meaning": field.meaning}
+                for name, field in FIELDS.items()
+            },
+            "scene": "name of the MJCF file beside it: hand, object (body `object`), what holds it up, table",
+        },
+        "demonstrations": [dict(demonstration) for demonstration in demonstrations],
+        "parity": {"with": "Brax's inference", "inputs": 10_000, "largest_difference": difference},
+        "versions": {
+            "python": platform.python_version(),
+            **{name: importlib.metadata.version(name) for name in _PACKAGES},
+        },
+    }
+
+
+def _input(feature: Feature, start: int) -> dict[str, Any]:
+    def every(values: Any) -> list[float]:
+        return [float(value) for value in np.broadcast_to(np.asarray(values, float), feature.size)]
+
+    return {
+        "name": feature.name,
+        "start": start,
+        "size": feature.size,
+        "unit": feature.unit,
+        "frame": feature.frame,
+        "elements": list(feature.elements),
+        "offset": every(feature.offset),
+        "scale": every(feature.scale),
+        "meaning": feature.meaning,
+    }
+
+
+def _body(demonstrations: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    gains = Gains()
+    stiffness = [gains.wrist_slide[0]] * 3 + [gains.wrist_turn[0]] * 3 + gains.stiffness.tolist()
+    damping = [gains.wrist_slide[1]] * 3 + [gains.wrist_turn[1]] * 3 + gains.damping.tolist()
+    limit = [None] * 6 + gains.force_limit.tolist()
+    return {
+        "hand": sorted({demonstration["hand"] for demonstration in demonstrations}),
+        "actuators": [
+            {
+                "name": name,
+                "kind": "position",
+                "unit": unit,
+                "stiffness": kp,
+                "damping": kv,
+                "force_limit": most,
+            }
+            for name, unit, kp, kv, most in zip(TARGETS, _UNITS, stiffness, damping, limit, strict=True)
+        ],
+        "units": "stiffness N/m or N m/rad, damping N s/m or N m s/rad, force_limit N m (null: none)",
+        "wrist": "carried without gravity: the body has gravity compensation, the arm is not modelled",
+        "limits": "low and high of each reference",
+    }

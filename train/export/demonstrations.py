@@ -1,0 +1,63 @@
+"""Demonstrations of an export: a scene that plain MuJoCo loads, and a reference for a player."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+from envs.tracking import TrackingEnv
+from mjx_hand.errors import InputError
+from mjx_hand.player.tracking_reference import TrackingReference, save_tracking_reference
+from train.export.scene_xml import scene_xml
+
+FOLDER = "demonstrations"
+
+
+def save_demonstrations(env: TrackingEnv, numbers: Sequence[int], folder: Path) -> list[dict[str, Any]]:
+    """Write `demonstrations/NNN.xml` and `NNN.npz` of an environment's demonstrations; what each is, for the contract.
+
+    Raises:
+        InputError: the task still helps the object when the training is over, which no player can.
+    """
+    if env.assisted and float(env.task.assist_stiffness(jax.numpy.ones(()))) > 0:
+        raise InputError(
+            f"task.assist_until is {env.task.assist_until}: the object is still helped at the end of the training, "
+            "which no player can; train with 1 or less"
+        )
+    (folder / FOLDER).mkdir()
+    return [_save(env, k, folder / FOLDER) for k in numbers]
+
+
+def _save(env: TrackingEnv, number: int, folder: Path) -> dict[str, Any]:
+    demonstration, tables = env.demonstrations[number], env.tables
+    frames = demonstration.num_frames
+    name = f"{number:03d}"
+    rows = {
+        field: np.asarray(getattr(env.reference, field)[number])[:frames]
+        for field in ("targets", "controls", "grip", "object_pose")
+    }
+    reference = TrackingReference(
+        **rows,
+        base=np.asarray(env.reference.base[number]),
+        object_features=np.asarray(env.reference.features[number]),
+        start_qpos=np.asarray(tables.starts.qpos[number, 0]),
+        start_qvel=np.asarray(tables.starts.qvel[number, 0]),
+        low=np.asarray(tables.low),
+        high=np.asarray(tables.high),
+        rate=env.fps,
+        substeps=env.task.substeps,
+        scene=f"{name}.xml",
+    )
+    (folder / reference.scene).write_text(scene_xml(demonstration, env.hands[number]))
+    save_tracking_reference(reference, folder / f"{name}.npz")
+    return {
+        "reference": f"{FOLDER}/{name}.npz",
+        "scene": f"{FOLDER}/{name}.xml",
+        "frames": frames,
+        "grasp": demonstration.grasp,
+        "object": demonstration.object.kind,
+        "hand": demonstration.motion.side,
+        "source": demonstration.source,
+    }
