@@ -81,7 +81,7 @@ def unusable(folder: Path) -> dict[str, tuple[Path, str]]:
     (folder / "zero.npz").touch()
     np.savez(folder / "other.npz", stuff=np.zeros(3))
     files["missing"] = (folder / "gone.npz", "no such file")
-    files["film"] = (folder / "film.mp4", "formats read: ARCTIC, ")
+    files["film"] = (folder / "film.mp4", "not a recording that is")
     files["zero"] = (folder / "zero.npz", "the file is empty")
     files["other"] = (folder / "other.npz", "an .npz of stuff")
     return files

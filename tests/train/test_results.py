@@ -148,7 +148,7 @@ def test_curves_are_read_as_they_were_written(tmp_path):
     assert load_curve(tmp_path) == points
     assert minutes_to_learn(points) == 2.0
     (tmp_path / "curve.csv").write_text("a,b\n1,2\n")
-    with pytest.raises(InputError, match="not a learning curve; train again"):
+    with pytest.raises(InputError, match="not a learning curve; delete it"):
         load_curve(tmp_path)
 
 

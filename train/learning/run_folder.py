@@ -94,9 +94,9 @@ def _gone_if_refused(folder: RunFolder) -> Iterator[None]:
         yield
     except InputError:
         if made and not folder.states.is_dir() and is_first():
-            for name in (FILE, _LOCK):
-                (folder.path / name).unlink(missing_ok=True)
-            with contextlib.suppress(OSError):  # something else is in it by now
+            with contextlib.suppress(OSError):  # it never came to be, or something else is in it by now
+                for name in (FILE, _LOCK):
+                    (folder.path / name).unlink(missing_ok=True)
                 for path in made:
                     path.rmdir()
         raise

@@ -84,7 +84,7 @@ def test_ray_against_a_known_triangle():
         ("markers: {a: {vertex: 3, facing: dorsal, offset: 0}}", "give either a vertex"),
         ("markers: {a: {vertex: -1, offset: 0}}", "give either a vertex"),
         ("markers: {a: {vertex: 3, offset: 0, within: 0}}", "within is 0"),
-        ("markers: {a: {vertex: 3, offset: 0, labels: ['(']}}", "labels has '\\(', not a regular expression"),
+        ("markers: {a: {vertex: 3, offset: 0, labels: ['(']}}", "labels has '\\(', which is not a regular expression"),
         ("markers: {a: {vertex: 3, offset: 0, labels: [3]}}", "labels has 3"),
         ("!!python/object/apply:os.system ['true']", "not YAML"),
     ],

@@ -124,7 +124,7 @@ def test_an_interrupted_set_leaves_nothing(tmp_path, monkeypatch, when, error):
 
 def test_a_place_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "file").write_text("not a folder")
-    with pytest.raises(InputError, match="choose another folder for demonstrations"):
+    with pytest.raises(InputError, match="choose a folder that you may write to"):
         make_set(SETTINGS, tmp_path / "file" / "sets")
 
 

@@ -61,7 +61,7 @@ def test_recordings_side_by_side_and_chunks_change_nothing(inspire):
     apart = retarget_keypoints(noisy.reshape(2, 300, 21, 3), tree, objective)
     assert apart.dofs.shape == (2, 300, 6)
     first = retarget_keypoints(noisy[:300], tree, objective)
-    np.testing.assert_allclose(apart.dofs[0], first.dofs, atol=1e-5)
+    np.testing.assert_allclose(apart.dofs[0], first.dofs, atol=1e-3)
     far = slice(0, 250)  # from the cut, which one recording does not have
     np.testing.assert_allclose(whole.dofs[far], first.dofs[far], atol=5e-3)
 
@@ -147,7 +147,7 @@ def test_streaming_follows_holds_over_gaps_and_filters(inspire):
     exact = replace(objective, smoothness=0.0)
     stream = KeypointStream(tree, exact)
     poses = [stream.step(frame) for frame in keypoints]
-    np.testing.assert_allclose([p.dofs for p in poses], dofs, atol=1e-3)
+    np.testing.assert_allclose([p.dofs for p in poses], dofs, atol=3e-3)
     held = stream.step(np.full((21, 3), np.nan))
     assert not held.seen
     np.testing.assert_array_equal(held.dofs, poses[-1].dofs)

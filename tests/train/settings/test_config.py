@@ -23,7 +23,8 @@ def refusal(*overrides: str) -> str:
 
 @pytest.mark.parametrize("name", EXPERIMENTS)
 def test_every_experiment_composes(name):
-    config = compose([f"config={name}"])
+    recording = ["data.recording.path=recording"] if name == "mustard" else []
+    config = compose([f"config={name}", *recording])
     assert config.name == name
     assert config.out == f"outputs/{name}/seed0"
 
