@@ -256,6 +256,7 @@ def test_what_cannot_be_used_is_said(env, same_step):
         same_step.reset(options={"demonstration": 0, "frame": 10_000})
 
 
+@pytest.mark.slow
 def test_make_vec_makes_one_of_a_grasp_type(set_root):
     vector = gymnasium.make_vec(
         "envs.gym:mjx-hand/pinch-v0", 2, data=SETTINGS, part="heldout", demonstrations=set_root, engine="native"

@@ -98,6 +98,7 @@ def test_a_grip_is_part_of_the_controls(demonstrations, hands, reference, env):
 BALL = ObjectDescription(kind="sphere", size=np.array([0.0165, 0.0, 0.0]), mass=0.1, friction=1.0)
 
 
+@pytest.mark.slow
 def test_kinds_and_types_mix_and_each_is_as_if_it_were_alone(demonstrations, hands, monkeypatch):
     """Controls of a mixed set, in any order, are those of sets of one kind pressed with its own type's force."""
     forces = {"lateral": 2.5, "pinch": 8.0, "spherical": 6.0}

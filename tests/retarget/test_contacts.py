@@ -60,6 +60,7 @@ def test_frames_that_do_not_pair_and_nan_are_refused():
         contact_normals(np.full((3, 5, 3), np.nan), np.tile(np.eye(4), (3, 1, 1)), *mesh)
 
 
+@pytest.mark.slow
 def test_contacts_of_the_real_grasp_stay(recordings):
     """Where the recording's tips touch the bottle, the refined hand's do, to half a millimetre."""
     folder = recordings / "dexmv_mustard"

@@ -39,6 +39,7 @@ def given(tiny: Config, tmp_path_factory: pytest.TempPathFactory) -> Config:
     )
 
 
+@pytest.mark.slow
 def test_a_policy_is_trained_evaluated_and_played(given: Config):
     points = train.ppo.train(given)
     assert [point.steps for point in points] == [0, 32, 64]

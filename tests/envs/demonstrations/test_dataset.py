@@ -55,6 +55,7 @@ def test_the_folder_tells_settings_apart(tmp_path):
     assert len(folders) == 4
 
 
+@pytest.mark.slow
 def test_the_same_seed_makes_the_same_set(set_path, tmp_path):
     again = make_set(SETTINGS, tmp_path)
     assert again.name == set_path.name

@@ -139,6 +139,7 @@ def test_joints_above_the_palm_stand_still(tmp_path):
     assert [free.dofs[free.joint_names.index(name)] for name in ("shoulder", "wrist")] == [HELD, HELD]
 
 
+@pytest.mark.slow
 def test_positions_are_reached_from_any_posture(tmp_path):
     urdf, description = little_hand.write(tmp_path)
     tree, objective = robot_objective(load_robot(description), urdf, "position")

@@ -40,6 +40,7 @@ def number(cell: str) -> float:
     return float(cell.split(" (")[0].replace(",", ""))
 
 
+@pytest.mark.slow
 def test_report_is_a_table_with_the_same_figures_in_a_file_and_a_plot(demonstrations, tmp_path, capsys):
     folders = ("--out", str(tmp_path), "--demonstrations", str(demonstrations))
     assert main(["engines", *TINY, *folders]) == 0

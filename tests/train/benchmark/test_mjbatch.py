@@ -27,6 +27,7 @@ def env(demonstrations):
     return small_env("native", "pinch", demonstrations)
 
 
+@pytest.mark.slow
 def test_a_model_comes_out_of_the_files_as_it_went_in(env, tmp_path):
     wanted = solver.gauss_seidel(env.models)
     write_scene(tmp_path, env, {"some": wanted})

@@ -51,7 +51,9 @@ def test_without_one_the_command_that_trains_is_named(untrained: Config):
         viewer(untrained)
 
 
-@pytest.mark.parametrize("name", [*FIVE, "all"])
+@pytest.mark.parametrize(
+    "name", ["pinch", "all", *(pytest.param(name, marks=pytest.mark.slow) for name in FIVE if name != "pinch")]
+)
 def test_the_policies_that_come_along_do_what_the_zero_residual_does_not(name: str):
     """On the demonstration beside each, from frame 0, and still there five seconds later."""
     config = compose([f"config={name}", "engine=native"])

@@ -36,6 +36,7 @@ def caught(env: TrackingEnv) -> Caught:
     return step(state, jnp.zeros((3, 26))).info["caught"]
 
 
+@pytest.mark.slow
 def test_the_state_before_the_step_is_kept(caught: Caught):
     assert caught.count.tolist() == [0, 1, 0]
     assert np.flatnonzero(np.isnan(caught.twin.residual[1])).tolist() == [FINGER]

@@ -38,7 +38,13 @@ def fingers_at(model: mujoco.MjModel, qpos: np.ndarray) -> set[str]:
     return {name.rstrip("123") for name in bodies - {OBJECT, "world"}}
 
 
-@pytest.mark.parametrize("name", grasp_names())
+# One type whose pads press and one that wraps; the others take as long each.
+QUICK = ("pinch", "cylindrical")
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in grasp_names()]
+)
 def test_a_type_is_performed_and_is_what_it_is_called(name, hand):
     grasp = grasp_type(name)
     trials, tally = perform_trials(grasp, [hand], per_person=2, seed=1)
