@@ -9,15 +9,17 @@ import pytest
 from envs.evaluation.roll_out import make_roll_out
 from mjx_hand.errors import InputError
 from mjx_hand.motion.resample import quaternion_matrices
+from mjx_hand.player.play_policy import play_policy
 from mjx_hand.view.browser.scene import Layer, MeshLayer
 from mjx_hand.view.browser.viewer import Viewer
 from tests.view.browser.chromium import find_chromium, page
-from train.experiment.setup import chosen_checkpoint, load_env
+from train.experiment.setup import chosen_checkpoint, load_env, rolled_out
+from train.export.export_policy import export_policy
 from train.learning.curve import Point
 from train.learning.policy import deterministic_policy
 from train.play import viewer
 from train.settings.config import Config
-from train.settings.options import Play
+from train.settings.options import Export, Play
 
 Trained = tuple[Path, list[Point]]
 
@@ -54,6 +56,16 @@ def test_it_shows_where_twin_and_object_were(playing: Viewer, tiny: Config):
     away = np.linalg.norm(rollouts.object_pose[0, :frames, :3] - rollouts.object_reference[0, :frames, :3], axis=1)
     np.testing.assert_allclose(playing.scene.curves[0].values, 100 * away, atol=1e-3)
     assert playing.scene.title.startswith("tiny 0: ")
+
+
+def test_an_export_of_the_run_takes_the_same_path(trained: Trained, tiny: Config, tmp_path: Path):
+    folder = export_policy(dataclasses.replace(tiny, export=Export(folder=str(tmp_path / "export"))))
+    played = play_policy(folder / "policy.npz", folder / "demonstrations/000.npz")
+    _, rollouts, scores = rolled_out(tiny, load_env(tiny, "heldout"))
+    path = rollouts.object_pose[0, rollouts.counted[0]]
+    assert np.linalg.norm(played.object_pose[:, :3] - path[:, :3], axis=1).max() < 1e-3
+    assert played.success == scores.scores["manip_trans_object"][0]
+    assert not (folder / "demonstrations/001.npz").exists()  # there is one, and up to three are written
 
 
 def test_a_demonstration_that_is_not_there(trained: Trained, tiny: Config):
