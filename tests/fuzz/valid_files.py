@@ -100,7 +100,7 @@ def joint_motion() -> JointMotion:
 
 def _own(folder: Path) -> list[Valid]:
     joints = joint_motion()
-    rotations = Rotation.random(FRAMES * 15, rng=RNG).as_matrix().reshape(FRAMES, 15, 3, 3)
+    rotations = Rotation.from_rotvec(RNG.normal(scale=0.2, size=(FRAMES * 15, 3))).as_matrix().reshape(FRAMES, 15, 3, 3)
     wrist: dict[str, Any] = {"wrist_position": joints.wrist_position, "wrist_quaternion": joints.wrist_quaternion}
     motion = Motion(
         fps=30.0, rotations=rotations, **wrist, shape=RNG.normal(size=10), valid=np.ones(FRAMES, bool), source="valid"
