@@ -12,8 +12,6 @@ from mujoco import mjx
 from envs.physics.engine import Engine, PhysicsState
 from mjx_hand.errors import InputError
 
-_Carry = tuple[Array, Array, Array]
-
 
 @dataclasses.dataclass(frozen=True)
 class SolverLoad:
@@ -50,56 +48,46 @@ def solver_load(engine: Engine, start: PhysicsState, controls: Float[Array, "t n
     made: Any = engine
     blank = made._blank(len(start.variant)) if engine.name == "warp" else made._blank
 
-    def one(
-        variant: Array, qpos: Array, qvel: Array, warmstart: Array, ctrl: Array
-    ) -> tuple[Array, Array, Array, dict[str, Array]]:
-        data = blank.replace(qpos=qpos, qvel=qvel, qacc_warmstart=warmstart, ctrl=ctrl)
-        data = mjx.step(made._family.model(variant), data)
-        return data.qpos, data.qvel, data.qacc_warmstart, step_load(data)
-
-    def step(carry: _Carry, ctrl: Array) -> tuple[_Carry, Mapping[str, Array]]:
-        qpos, qvel, warmstart, load = jax.vmap(one)(start.variant, *carry, ctrl)
-        return (qpos, qvel, warmstart), over_worlds(load)
-
     @jax.jit
-    def run(carry: _Carry, controls: Array) -> Mapping[str, Array]:
-        return jax.lax.scan(step, carry, jnp.repeat(controls, engine.substeps, axis=0))[1]
+    @jax.vmap
+    def run(variant: Array, qpos: Array, qvel: Array, warmstart: Array, controls: Array) -> dict[str, Array]:
+        model = made._family.model(variant)
 
-    return mean_load(run((start.qpos, start.qvel, start.memory), controls))
+        def step(data: mjx.Data, ctrl: Array) -> tuple[mjx.Data, dict[str, Array]]:
+            data = mjx.step(model, data.replace(ctrl=ctrl))
+            return data, step_load(data)
+
+        data = blank.replace(qpos=qpos, qvel=qvel, qacc_warmstart=warmstart)
+        return jax.lax.scan(step, data, jnp.repeat(controls, engine.substeps, axis=0))[1]
+
+    return mean_load(run(start.variant, start.qpos, start.qvel, start.memory, jnp.swapaxes(controls, 0, 1)))
 
 
 def step_load(data: mjx.Data) -> dict[str, Array]:
     """What the last step of one world had to solve, within `jax.vmap`."""
     told: Any = data._impl
     if hasattr(told, "nacon"):  # MuJoCo Warp; its contacts are counted over all worlds
-        return {
-            "iterations": told.solver_niter,
-            "rows": told.nefc,
-            "room": jnp.array(told.njmax),
-            "all_contacts": told.nacon[0],
-        }
-    # MJX has room for every contact that may be; rows of those that do not act are zero.
-    return {
-        "rows": (told.efc_J != 0).any(axis=-1).sum(),
-        "room": jnp.array(told.efc_J.shape[0]),
-        "contacts": (told.contact.dist < told.contact.includemargin).sum(),
-    }
+        rows = told.nefc
+        load = {"iterations": told.solver_niter, "room": jnp.array(told.njmax), "all_contacts": told.nacon[0]}
+    else:  # MJX has room for every contact that may be; rows of those that do not act are zero
+        rows = (told.efc_J != 0).any(axis=-1).sum()
+        acting = (told.contact.dist < told.contact.includemargin).sum()
+        load = {"room": jnp.array(told.efc_J.shape[0]), "contacts": acting}
+    return {name: value.astype(jnp.float32) for name, value in {**load, "rows": rows, "most_rows": rows}.items()}
 
 
-def over_worlds(load: Mapping[str, Float[Array, "n"]]) -> dict[str, Array]:
-    """Means over the worlds of what `step_load` tells of each, and the most rows."""
-    means = {name: value.astype(jnp.float32).mean() for name, value in load.items() if name != "all_contacts"}
-    if "all_contacts" in load:
-        means["contacts"] = load["all_contacts"][0] / len(load["all_contacts"])
-    return {**means, "most_rows": load["rows"].max().astype(jnp.float32)}
+def over_steps(load: Mapping[str, Float[Array, "... t"]]) -> dict[str, Array]:
+    """The load of several steps of each world, their last axis, as that of one."""
+    return {name: value.max(-1) if name == "most_rows" else value.mean(-1) for name, value in load.items()}
 
 
-def mean_load(steps: Mapping[str, Float[Array, "t"]]) -> SolverLoad:
-    """The load over steps, of each of which `over_worlds` tells."""
+def mean_load(loads: Mapping[str, Float[Array, "n ..."]]) -> SolverLoad:
+    """The load over n worlds and their steps."""
+    mean = {name: float(value.mean()) for name, value in loads.items()}
     return SolverLoad(
-        iterations=float(steps["iterations"].mean()) if "iterations" in steps else None,
-        rows=float(steps["rows"].mean()),
-        contacts=float(steps["contacts"].mean()),
-        most_rows=float(steps["most_rows"].max()),
-        room=float(steps["room"].max()),
+        iterations=mean.get("iterations"),
+        rows=mean["rows"],
+        contacts=mean["all_contacts"] / len(loads["rows"]) if "all_contacts" in mean else mean["contacts"],
+        most_rows=float(loads["most_rows"].max()),
+        room=mean["room"],
     )

@@ -90,8 +90,8 @@ class WarpEngine:
         def one(v: Array, q: Array, qd: Array, w: Array, u: Array) -> tuple[Array, ...]:
             model = self._family.model(v)
             data = blank.replace(qpos=q, qvel=qd, qacc_warmstart=w, ctrl=u)
-            for _ in range(self.substeps):
-                data = mjx.step(model, data)
+            # A loop, not copies of the call: Warp captures a CUDA graph for every set of buffers that it is given.
+            data, _ = jax.lax.scan(lambda d, _: (mjx.step(model, d), None), data, length=self.substeps)
             return data.qpos, data.qvel, data.qacc_warmstart
 
         return jax.vmap(one)(variant, qpos, qvel, warmstart, ctrl)

@@ -10,7 +10,7 @@ import mujoco
 from jaxtyping import Array, UInt
 from mujoco import mjx
 
-from envs.physics.solver_load import mean_load, over_worlds, step_load
+from envs.physics.solver_load import mean_load, over_steps, step_load
 from mjx_hand.errors import InputError
 from train.benchmark.contestants import compiled
 from train.benchmark.gpu.allegro import COMMANDS, SUBSTEPS, allegro_model
@@ -20,7 +20,6 @@ from train.benchmark.gpu.record import Record
 # Physics steps a second of the same scene on 8192 worlds, as published for Newton.
 PUBLISHED = {"RTX PRO 6000": 3.35e6, "RTX 5090": 3.1e6}
 PUBLISHED_ITERATIONS = 1.18
-_Carry = tuple[Array, Array, Array]
 _ROWS, _CONTACTS = 64, 48  # that a world has room for; Newton's benchmark has 60 and 35
 
 
@@ -70,29 +69,24 @@ def allegro(bench: Bench, record: Record, keep: Callable[[], None]) -> None:
 
 
 def stepper(model: mujoco.MjModel, worlds: int, commands: int) -> Callable[[UInt[Array, ""]], tuple[Array, Any]]:
-    """A function from a random key to where worlds are after so many commands, and the solver's load at each step."""
+    """A function from a random key to where worlds are after so many commands, and the solver's load at each."""
     from envs.physics.warp import put_quietly  # importing it needs Warp
 
     put = put_quietly(model)
     blank = mjx.make_data(model, impl="warp", naconmax=_CONTACTS * worlds, naccdmax=_CONTACTS * worlds, njmax=_ROWS)
 
-    def one(qpos: Array, qvel: Array, warmstart: Array, ctrl: Array) -> tuple[Array, Array, Array, dict[str, Array]]:
-        data = mjx.step(put, blank.replace(qpos=qpos, qvel=qvel, qacc_warmstart=warmstart, ctrl=ctrl))
-        return data.qpos, data.qvel, data.qacc_warmstart, step_load(data)
+    def command(data: mjx.Data, key: UInt[Array, ""]) -> tuple[mjx.Data, dict[str, Array]]:
+        data = data.replace(ctrl=jax.random.uniform(key, (model.nu,), minval=-1.0, maxval=1.0))
 
-    def command(carry: _Carry, key: UInt[Array, ""]) -> tuple[_Carry, Any]:
-        ctrl = jax.random.uniform(key, (worlds, model.nu), minval=-1.0, maxval=1.0)
+        def step(data: mjx.Data, _: None) -> tuple[mjx.Data, dict[str, Array]]:
+            data = mjx.step(put, data)
+            return data, step_load(data)
 
-        def step(carry: _Carry, _: None) -> tuple[_Carry, Any]:
-            qpos, qvel, warmstart, load = jax.vmap(one)(*carry, ctrl)
-            return (qpos, qvel, warmstart), over_worlds(load)
+        data, loads = jax.lax.scan(step, data, length=SUBSTEPS)
+        return data, over_steps(loads)
 
-        return jax.lax.scan(step, carry, length=SUBSTEPS)
+    def world(key: UInt[Array, ""]) -> tuple[Array, dict[str, Array]]:
+        data, loads = jax.lax.scan(command, blank, jax.random.split(key, commands))
+        return data.qpos, loads
 
-    def run(key: UInt[Array, ""]) -> tuple[Array, Any]:
-        start = (jnp.asarray(model.qpos0, jnp.float32), jnp.zeros(model.nv), jnp.zeros(model.nv))
-        carry = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (worlds, *leaf.shape)), start)
-        (qpos, _, _), loads = jax.lax.scan(command, carry, jax.random.split(key, commands))
-        return qpos, {name: leaf.reshape(-1) for name, leaf in loads.items()}
-
-    return run
+    return lambda key: jax.vmap(world)(jax.random.split(key, worlds))

@@ -44,7 +44,7 @@ class Scale:
     training_engine: str | None = None
     trainings: tuple[str, ...] = ("pinch", "all")
     ppo: dict[str, Any] = dataclasses.field(default_factory=dict)
-    checks: int | None = None
+    checks: int | None = 655_360  # ten updates: the pinch is learned in about as many
     data: dict[str, Any] = dataclasses.field(default_factory=dict)
     learned: float = 0.95
     most_steps: int = 50_000_000
