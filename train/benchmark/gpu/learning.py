@@ -7,7 +7,6 @@ import numpy as np
 
 from envs.demonstrations.dataset import make_missing_sets
 from envs.tracking import TrackingEnv
-from mjx_hand.errors import InputError
 from mjx_hand.view.figures import plots
 from train.benchmark.contestants import environment, physics
 from train.benchmark.gpu.bench import Bench
@@ -98,18 +97,13 @@ def _longer(config: Config, steps: int) -> Config:
 
 
 def _env(bench: Bench, config: Config, record: Record) -> TrackingEnv:
-    """The training part, made once; on the host's engine, and that is noted, where the GPU's refuses its objects."""
-    engine = bench.scale.training_engine or bench.engine
+    """The training part, made once, on the engine that the experiment names, or else on the measured one."""
     if config.name not in bench.trained:
+        engine = bench.scale.training_engine or (bench.engine if config.engine == "auto" else config.engine)
+        if engine != bench.engine:
+            record.notes.append(f"Physics is {engine}: {bench.engine} cannot, or would take minutes here.")
         make_missing_sets(config.data, config.demonstrations)
-        try:
-            env = load_env(dataclasses.replace(config, engine=engine), "train")
-        except InputError as error:
-            if engine == "native":
-                raise
-            record.notes.append(f"Engine {engine} refuses these demonstrations: {error}. Physics is native.")
-            env = load_env(dataclasses.replace(config, engine="native"), "train")
-        bench.trained[config.name] = env
+        bench.trained[config.name] = load_env(dataclasses.replace(config, engine=engine), "train")
     return bench.trained[config.name]
 
 
