@@ -10,7 +10,7 @@ from envs.demonstrations.from_recording.demonstration import RECORDED
 from envs.demonstrations.from_recording.variations import RecordingSettings
 from envs.demonstrations.scripted.simulated_capture import CaptureSettings
 from envs.grasps import grasp_names, grasp_type
-from mjx_hand.capture.datasets.dexmv_object import recording_files
+from mjx_hand.capture.object_poses.dexmv_object import recording_files
 from mjx_hand.errors import InputError
 from mjx_hand.objects.mesh_file import mesh_digest
 
