@@ -1,0 +1,178 @@
+"""Files of an object's poses that other programs write: `.csv`, `.npy`, `.npz`, `.json`.
+
+Position (m) and quaternion, scene from object: `.csv` with columns `x`, `y`, `z`, `qw`, `qx`, `qy`, `qz` and, if there
+are any, `time` (s); `.npy` of (t, 7), position and quaternion wxyz, or of matrices (t, 4, 4); `.npz` and `.json` with
+`poses`, either of these, or `position` and `quaternion`, and `fps` or `times` (s). Empty cells, NaN and rows of zeros
+are gaps. Times count from the first row, at which the hand's recording begins too.
+"""
+
+import csv
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from mjx_hand.errors import InputError
+from mjx_hand.files.checked_arrays import numbers
+from mjx_hand.files.npz_archive import open_arrays
+from mjx_hand.motion import RecordedObject
+from mjx_hand.motion.make_scene import poses_at, resample_object
+from mjx_hand.pytree import replace
+
+Array = np.ndarray
+_COLUMNS = ("x", "y", "z", "qw", "qx", "qy", "qz")
+_TIME = "time"
+_SUFFIXES = (".csv", ".npy", ".npz", ".json")
+_HOLE = 3.5  # steps: rows further apart have a gap between them
+
+
+@dataclass(frozen=True)
+class PoseTrack:
+    """An object's poses.
+
+    Attributes:
+        poses: as `mjx_hand.recorded_object` takes them, NaN in gaps.
+        times: of each, s, or None.
+        fps: of them, or None where nothing is said.
+    """
+
+    poses: Float[Array, "t *d"]
+    times: Float[Array, "t"] | None = None
+    fps: float | None = None
+
+
+def load_poses(path: str | Path) -> PoseTrack:
+    """Read an object's poses.
+
+    Raises:
+        InputError: no such file, of another kind, or its contents are not poses.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if not path.is_file() or suffix not in _SUFFIXES:
+        found = "no such file" if not path.is_file() else f"suffix {suffix or 'none'}"
+        raise InputError(f"{path}: {found}; poses of an object are {', '.join(_SUFFIXES)} (docs/scenes.md)")
+    if suffix == ".csv":
+        return _table(path)
+    arrays = _json(path) if suffix == ".json" else open_arrays(path) if suffix == ".npz" else {"poses": _array(path)}
+    if "poses" not in arrays and {"position", "quaternion"} <= set(arrays):
+        n = numbers(path, arrays, {"position": ("t", 3), "quaternion": ("t", 4)}, finite=False)
+        poses = np.concatenate([n["position"], n["quaternion"]], axis=1).astype(float)
+    else:
+        poses = arrays.get("poses")
+    if poses is None or np.asarray(poses).dtype.kind not in "fiu" or np.ndim(poses) not in (2, 3):
+        raise InputError(f"{path}: has no 'poses' of (t, 7) or (t, 4, 4), nor 'position' and 'quaternion'")
+    times = numbers(path, arrays, {"times": (len(poses),)})["times"].astype(float) if "times" in arrays else None
+    fps = float(numbers(path, arrays, {"fps": ()})["fps"]) if "fps" in arrays else None
+    return _checked(path, PoseTrack(np.asarray(poses, float), times, fps))
+
+
+def in_frames(found: RecordedObject, track: PoseTrack, fps: float, frames: int) -> RecordedObject:
+    """The object, whose poses are the track's, in the frames of a recording that begins with it.
+
+    Args:
+        found: of the track's poses.
+        track: says when they were.
+        fps, frames: of the recording.
+
+    Raises:
+        InputError: the track says no times, and has another number of frames.
+    """
+    if track.times is not None:
+        times = track.times - track.times[0]
+        moved = poses_at(found, times, np.arange(frames) / fps)
+        before = np.clip(np.searchsorted(times, np.arange(frames) / fps, side="right") - 1, 0, len(times) - 2)
+        steps = np.diff(times)
+        inside = np.abs(np.arange(frames) / fps - times[before]) > 1e-6
+        hole = (
+            (steps[before] > _HOLE * np.median(steps))
+            & inside
+            & (np.abs(np.arange(frames) / fps - times[before + 1]) > 1e-6)
+        )
+        return _hidden(moved, hole)
+    if track.fps is not None and abs(track.fps - fps) > 1e-6 * fps:
+        found = resample_object(found, track.fps, fps)
+    elif found.num_frames != frames:
+        raise InputError(
+            f"object {found.name!r}: {found.num_frames} poses for {frames} frames of the hand, and no times; give a "
+            "column 'time', or 'fps'"
+        )
+    return _padded(found, frames)
+
+
+def _hidden(found: RecordedObject, gap: Array) -> RecordedObject:
+    keep = ~gap[:, None]
+    return replace(
+        found,
+        seen=found.seen & ~gap,
+        position=np.where(keep, found.position, 0.0),
+        quaternion=np.where(keep, found.quaternion, [1.0, 0, 0, 0]),
+    )
+
+
+def _padded(found: RecordedObject, frames: int) -> RecordedObject:
+    """As many frames; those beyond the last pose are gaps."""
+    short = max(frames - found.num_frames, 0)
+    rest = np.tile([1.0, 0, 0, 0], (short, 1))
+    return replace(
+        found,
+        position=np.concatenate([found.position, np.zeros((short, 3))])[:frames],
+        quaternion=np.concatenate([found.quaternion, rest])[:frames],
+        seen=np.concatenate([found.seen, np.zeros(short, bool)])[:frames],
+    )
+
+
+def _table(path: Path) -> PoseTrack:
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            lines = (line for line in file if line.strip() and not line.startswith("#"))
+            rows = [{str(k).strip().lower(): v for k, v in row.items()} for row in csv.DictReader(lines)]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: not a readable table ({type(error).__name__}); export it again as UTF-8") from None
+    columns = [name for name in (*_COLUMNS, _TIME) if rows and name in rows[0]]
+    if not rows or not set(_COLUMNS) <= set(columns):
+        found = ", ".join(rows[0])[:100] if rows else "no rows"
+        raise InputError(f"{path}: has {found}; a table of poses has columns {', '.join(_COLUMNS)} and maybe {_TIME}")
+    try:
+        values = np.array([[float(row[name] or "nan") for name in columns] for row in rows])
+    except (TypeError, ValueError):
+        raise InputError(f"{path}: a cell of {', '.join(columns)} is no number; leave cells empty in gaps") from None
+    times = values[:, columns.index(_TIME)] if _TIME in columns else None
+    return _checked(path, PoseTrack(values[:, :7], times))
+
+
+def _checked(path: Path, track: PoseTrack) -> PoseTrack:
+    if len(track.poses) == 0:
+        raise InputError(f"{path}: has no poses")
+    if track.fps is not None and not (np.isfinite(track.fps) and track.fps > 0):
+        raise InputError(f"{path}: fps is {track.fps}, expected a positive number")
+    times = track.times
+    if times is not None and (len(times) < 2 or not np.isfinite(times).all() or (np.diff(times) <= 0).any()):
+        raise InputError(f"{path}: its times do not rise from row to row; sort the rows, in seconds")
+    return track
+
+
+def _json(path: Path) -> dict[str, Any]:
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        return {name: np.asarray(_missing(value)) for name, value in found.items()}
+    except (OSError, ValueError, AttributeError, RecursionError) as error:
+        raise InputError(f"{path}: not a readable JSON object of arrays ({str(error).splitlines()[0]})") from None
+
+
+def _missing(value: Any) -> Any:
+    """`null` as NaN."""
+    if isinstance(value, list):
+        return [_missing(each) for each in value]
+    return float("nan") if value is None else value
+
+
+def _array(path: Path) -> Array:
+    try:
+        with path.open("rb") as file:
+            return np.lib.format.read_array(file, allow_pickle=False)
+    except (ValueError, OSError, EOFError) as error:
+        raise InputError(f"{path}: not a readable .npy array ({str(error).splitlines()[0]})") from None
