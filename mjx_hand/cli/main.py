@@ -15,7 +15,7 @@ from mjx_hand.cli.wording import as_options
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 
-COMMANDS = ("build", "fit", "info", "keypoints", "retarget", "robot", "track", "view")
+COMMANDS = ("build", "fit", "info", "keypoints", "retarget", "robot", "scene", "track", "view")
 
 
 def _function(command: str) -> Callable[..., Any]:

@@ -155,12 +155,21 @@ def resample_object(found: RecordedObject, fps: float, rate: float) -> RecordedO
     return poses_at(found, times, query)
 
 
-def poses_at(found: RecordedObject, times: Float[Array, "t"], query: Float[Array, "q"]) -> RecordedObject:
-    """The object's poses, recorded at rising `times` (s), at other times; not seen beyond the first and last."""
+def poses_at(
+    found: RecordedObject, times: Float[Array, "t"], query: Float[Array, "q"], longest: float = np.inf
+) -> RecordedObject:
+    """The object's poses, recorded at rising `times` (s), at other times; not seen beyond the first and last.
+
+    Args:
+        found: a pose for each of `times`.
+        times, query: s.
+        longest: s between two poses up to which what lies between them was seen.
+    """
     before, after, fraction = interpolation_index(times, query)
     inside = (query >= times[0] - 1e-6) & (query <= times[-1] + 1e-6)
     at_first, at_last = fraction < 1e-6, fraction > 1 - 1e-6
     seen = inside & (found.seen[before] | at_last) & (found.seen[after] | at_first)
+    seen &= (times[after] - times[before] <= longest) | at_first | at_last
     position = fill_lines(found.position, found.seen)
     turn = Rotation.from_quat(fill_turns(found.quaternion, found.seen), scalar_first=True).as_matrix()
     step = fraction[:, None]

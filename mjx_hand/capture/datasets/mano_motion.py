@@ -63,7 +63,7 @@ def hands_of(
             f"{path}: holds both hands, and {request.mano} is the file of one; give the folder of MANO_RIGHT.pkl and "
             "MANO_LEFT.pkl, or choose a hand with side='right' or side='left'"
         )
-    asked = [dataclasses.replace(request, side=side, mano=_mano_file(request.mano, side)) for side in sides]
+    asked = [dataclasses.replace(request, side=side, mano=mano_file(request.mano, side)) for side in sides]
     return tuple(read(path, contents, each) for each in asked)
 
 
@@ -163,7 +163,7 @@ def mano_motion(
     )
 
 
-def _mano_file(mano: Path | None, side: str) -> Path | None:
+def mano_file(mano: Path | None, side: str) -> Path | None:
     """The file of this side, where the folder of both is given."""
     if mano is None or not mano.is_dir():
         return mano

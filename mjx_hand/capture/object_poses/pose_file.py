@@ -8,11 +8,13 @@ are gaps. Times count from the first row, at which the hand's recording begins t
 
 import csv
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 from jaxtyping import Float
 
 from mjx_hand.errors import InputError
@@ -83,16 +85,7 @@ def in_frames(found: RecordedObject, track: PoseTrack, fps: float, frames: int) 
     """
     if track.times is not None:
         times = track.times - track.times[0]
-        moved = poses_at(found, times, np.arange(frames) / fps)
-        before = np.clip(np.searchsorted(times, np.arange(frames) / fps, side="right") - 1, 0, len(times) - 2)
-        steps = np.diff(times)
-        inside = np.abs(np.arange(frames) / fps - times[before]) > 1e-6
-        hole = (
-            (steps[before] > _HOLE * np.median(steps))
-            & inside
-            & (np.abs(np.arange(frames) / fps - times[before + 1]) > 1e-6)
-        )
-        return _hidden(moved, hole)
+        return poses_at(found, times, np.arange(frames) / fps, _HOLE * float(np.median(np.diff(times))))
     if track.fps is not None and abs(track.fps - fps) > 1e-6 * fps:
         found = resample_object(found, track.fps, fps)
     elif found.num_frames != frames:
@@ -101,16 +94,6 @@ def in_frames(found: RecordedObject, track: PoseTrack, fps: float, frames: int) 
             "column 'time', or 'fps'"
         )
     return _padded(found, frames)
-
-
-def _hidden(found: RecordedObject, gap: Array) -> RecordedObject:
-    keep = ~gap[:, None]
-    return replace(
-        found,
-        seen=found.seen & ~gap,
-        position=np.where(keep, found.position, 0.0),
-        quaternion=np.where(keep, found.quaternion, [1.0, 0, 0, 0]),
-    )
 
 
 def _padded(found: RecordedObject, frames: int) -> RecordedObject:
@@ -123,6 +106,27 @@ def _padded(found: RecordedObject, frames: int) -> RecordedObject:
         quaternion=np.concatenate([found.quaternion, rest])[:frames],
         seen=np.concatenate([found.seen, np.zeros(short, bool)])[:frames],
     )
+
+
+def marker_places(path: str | Path, labels: Sequence[str]) -> Float[Array, "m 3"]:
+    """Where markers are on an object (m, its own frame): a YAML or JSON file of `marker: [x, y, z]`.
+
+    Raises:
+        InputError: it is not readable, or lacks one of the markers.
+    """
+    path = Path(path)
+    try:
+        found = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise InputError(f"{path}: not readable YAML ({' '.join(str(error).split())[:200]})") from None
+    missing = [label for label in labels if not isinstance(found, dict) or label not in found]
+    if missing:
+        raise InputError(f"{path}: has no place of marker {missing[0]!r}; write '{missing[0]}: [x, y, z]', in metres")
+    try:
+        places = np.array([found[label] for label in labels], float)
+    except (TypeError, ValueError):
+        places = np.zeros(0)
+    return numbers(path, {"places": places}, {"places": (len(labels), 3)})["places"]
 
 
 def _table(path: Path) -> PoseTrack:
