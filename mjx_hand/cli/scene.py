@@ -133,11 +133,9 @@ def _marked(
     posed = PoseTrack(track.poses, fps=float(seen.fps))
     added = in_frames(recorded_object(name, track.poses, **shape), posed, scene.fps, scene.num_frames)
     gaps, swaps = int(np.isnan(track.poses).any(axis=1).sum()), np.flatnonzero(track.swapped)
-    line = (
-        f"{name}: {len(labels)} markers, {1e3 * track.misfit:.2f} mm RMS from one rigid cluster"
+    line = f"{name}: {len(labels)} markers, {1e3 * track.misfit:.2f} mm RMS from one rigid cluster"
     if gaps:
         line += f"; not seen in {gaps} frames"
-    )
     if len(swaps):
         line += f"; labels had changed places in {len(swaps)} frames, first {swaps[0]}, and were put right"
     if at is None and shape.get("mesh") is not None:

@@ -18,11 +18,8 @@ def scene_facts(found: RecordedScene) -> facts_of.Facts:
     facts.append(("frames", f"{found.num_frames} at {found.fps:g}/s ({found.num_frames / found.fps:.1f} s)"))
     facts += [(f"object {each.name}", _object(found, each)) for each in found.objects]
     up = "not known" if found.up is None else ", ".join(f"{x:.3g}" for x in found.up)
-    facts += [
-        ("up", up),
-        ("units", "metres, radians, seconds; quaternions wxyz"),
-        ("source", found.source or "not said"),
-    ]
+    facts += [("up", up), ("units", "metres, radians, seconds; quaternions wxyz")]
+    facts.append(("source", found.source or "not said"))
     return (*facts, *(("note", note) for note in scene_notes(found)))
 
 

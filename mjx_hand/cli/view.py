@@ -94,7 +94,6 @@ def recording_scene(
     found = load_scene(path, side=side, sequence=sequence, fps=fps, mano=mano)
     if len(found.hands) == 1 and not found.objects:
         motion = found.hands[0]
-        return motion_scene(motion, load_hand(mano, motion.side), up or UP)
-    return recorded_scene(
-        found, {hand.side: load_hand(mano_file(mano, hand.side), hand.side) for hand in found.hands}, up
-    )
+        return motion_scene(motion, load_hand(mano_file(mano, motion.side), motion.side), up or UP)
+    hands = {hand.side: load_hand(mano_file(mano, hand.side), hand.side) for hand in found.hands}
+    return recorded_scene(found, hands, up)

@@ -10,6 +10,8 @@ from mjx_hand.motion.scene import NO_SURFACE, RecordedObject, RecordedScene
 
 Array = np.ndarray
 REACH = 0.3  # m from the wrist to what the hand may touch: a large hand is 0.2 m long
+_HALF = 0.2  # m more where only an object's origin is known, not its surface
+_ROOM = 3.0  # m: what is further away than this, though other objects are near, is in another unit or frame
 _POINTS = 2000  # of a surface, to which distances are measured
 
 
@@ -41,18 +43,27 @@ def _object_notes(scene: RecordedScene, found: RecordedObject) -> list[str]:
         notes.append(f"{found.name}: poses without a mesh")
     if found.kind == "mesh" and not trimesh.Trimesh(found.vertices, found.faces).is_watertight:
         notes.append(f"{found.name}: its mesh is not closed, so that it has no volume of its own; give its mass")
-    distances = [wrist_distance(motion, found) for motion in scene.hands]
-    known = [each[np.isfinite(each)] for each in distances]
-    if scene.hands and not any(each.size for each in known):
+    nearest = _nearest(scene, found)
+    if scene.hands and not np.isfinite(nearest):
         notes.append(f"{found.name}: never seen together with a hand")
     elif scene.hands:
-        nearest = min(float(each.min()) for each in known if each.size)
-        if nearest > REACH:
+        touched = any(_nearest(scene, each) <= _reach(each) for each in scene.objects)  # some only lie on the table
+        if nearest > (_ROOM if touched else _reach(found)):
             notes.append(
                 f"{found.name}: never near a hand, the wrist stays {nearest:.2f} m away; are both in metres and in one "
                 "frame?"
             )
     return notes
+
+
+def _nearest(scene: RecordedScene, found: RecordedObject) -> float:
+    """How near (m) a wrist comes to the object; infinite where they are never seen together."""
+    distances = [wrist_distance(motion, found) for motion in scene.hands]
+    return min((float(each[np.isfinite(each)].min(initial=np.inf)) for each in distances), default=np.inf)
+
+
+def _reach(found: RecordedObject) -> float:
+    return REACH + (_HALF if found.kind == NO_SURFACE else 0.0)
 
 
 def _surface(found: RecordedObject) -> Float[Array, "n 3"]:

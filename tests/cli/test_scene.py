@@ -108,7 +108,7 @@ def test_objects_with_markers(folder, capsys):
         (["--object", "cup=FOLDER/box.stl", "--poses", "FOLDER/bad.csv"], "has columns x, y, z, qw"),
         (["--object", "cup=FOLDER/box.stl", "--object-unit", "mm", "--poses", "FOLDER/poses.npy"], "8e-05 m long"),
         (["--object", "a=box:1", "a=box:2", "--poses", "a=x"], "'a' is given twice"),
-        (["--object-markers", "cup=a,b,c"], "cup: is no object here"),
+        (["--object-places", "cup=places.yaml"], "cup: is no object here"),
     ],
 )
 def test_what_cannot_be_is_one_line_and_nothing_is_written(folder, capsys, options, message):
