@@ -17,7 +17,7 @@ from mjx_hand.objects.mesh_file import mesh_digest
 ALL = "all"
 GIVEN = "given"
 _VERSION = 3  # of the generator: a change that makes other demonstrations of the same settings raises it
-_RECORDED_VERSION = 3  # the same of what is made of a recording
+_RECORDED_VERSION = 4  # the same of what is made of a recording
 
 
 @dataclasses.dataclass(frozen=True)
@@ -124,7 +124,7 @@ def fingerprint(settings: SetSettings) -> dict[str, Any]:
     return told
 
 
-def _recording_files(settings: RecordingSettings) -> tuple[Path, Path]:
+def _recording_files(settings: RecordingSettings) -> tuple[Path, ...]:
     try:
         return recording_files(settings.path)
     except InputError as error:

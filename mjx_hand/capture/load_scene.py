@@ -2,11 +2,14 @@
 
 from pathlib import Path
 
-from mjx_hand.capture.datasets.contents import read_contents
-from mjx_hand.capture.datasets.dataset_format import DatasetFormat, Request, dataset_formats
+from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request, dataset_formats
 from mjx_hand.capture.load import load_motion
 from mjx_hand.errors import InputError
+from mjx_hand.files.contents import read_contents
+from mjx_hand.files.input_file import check_input_file
 from mjx_hand.motion import RecordedScene, make_scene
+from mjx_hand.motion.plausibility.motions import plausible_motion
+from mjx_hand.pytree import replace
 
 
 def load_scene(
@@ -29,11 +32,13 @@ def load_scene(
             MANO_LEFT.pkl.
 
     Raises:
-        InputError: as `load_motion`; or the objects cannot be read.
+        InputError: as `load_motion`, or the objects cannot be read.
     """
     path = Path(path)
-    known = None
-    if markers is None and path.exists():
+    known, contents = None, {}
+    if markers is None:
+        if not path.is_dir():
+            check_input_file(path, "give the path of a recording")
         contents = read_contents(path)
         known = scene_format(path, contents)
     if known is None or known.read_scene is None:
@@ -46,10 +51,10 @@ def load_scene(
     scene = known.read_scene(path, contents, Request(side, sequence, folder, None if fps is None else float(fps)))
     if fps is not None and fps != scene.fps:
         raise InputError(f"{path}: was recorded at {scene.fps:g} frames per second; leave out fps={fps:g}")
-    return scene
+    return replace(scene, hands=tuple(plausible_motion(hand, name=str(path)) for hand in scene.hands))
 
 
-def scene_format(path: Path, contents: dict) -> DatasetFormat | None:
+def scene_format(path: Path, contents: Contents) -> DatasetFormat | None:
     """The format that recognises a recording and reads more than one hand, or None."""
     known = next((each for each in dataset_formats() if each.recognises(path, contents)), None)
     return known if known is not None and known.read_scene is not None else None

@@ -15,6 +15,7 @@ def scene_facts(found: RecordedScene) -> facts_of.Facts:
         about = dict(facts_of.motion(hand))
         facts.append(("hand", about["hand"]))
         facts += [(f"  {label}", about[label]) for label in ("gaps", "wrist")]
+        facts += [("  warning", warning) for warning in hand.warnings]
     facts.append(("frames", f"{found.num_frames} at {found.fps:g}/s ({found.num_frames / found.fps:.1f} s)"))
     facts += [(f"object {each.name}", _object(found, each)) for each in found.objects]
     up = "not known" if found.up is None else ", ".join(f"{x:.3g}" for x in found.up)

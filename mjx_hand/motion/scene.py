@@ -14,6 +14,7 @@ from mjx_hand.pytree import pytree, static
 SIDES = ("right", "left")
 NO_SURFACE = "none"
 KINDS = (*OBJECT_KINDS, NO_SURFACE)  # of a scene's objects
+_FARTHEST = 1e4  # m; no object is there
 _UNIT = 1e-3  # how far a quaternion or a direction may be from length 1
 _ON_HINGE = 2e-3  # m and rad by which a part's pose may be off what its hinge says
 _DIMENSIONS = {"box": 3, "sphere": 1, "cylinder": 2, "capsule": 2}  # how many sizes a shape has
@@ -179,6 +180,8 @@ def check_object(found: RecordedObject, name: str) -> None:
     for field in ("position", "quaternion", "size", "vertices"):
         if not np.isfinite(getattr(found, field)).all():
             raise InputError(f"{name}: {field} has NaN or infinity; mark gaps as seen=False and hold zero there")
+    if np.abs(found.position).max() > _FARTHEST:
+        raise InputError(f"{name}: it is {np.abs(found.position).max():.3g} m away; give positions in metres")
     length = np.linalg.norm(found.quaternion, axis=1)
     if (np.abs(length - 1) > _UNIT).any():
         worst = int(np.argmax(np.abs(length - 1)))

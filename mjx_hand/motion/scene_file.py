@@ -6,15 +6,16 @@ attributes of `RecordedObject`, K counting from 0 in the order of `objects`. Wha
 """
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mjx_hand.errors import InputError
-from mjx_hand.files.checked_arrays import numbers, text
+from mjx_hand.files.checked_arrays import numbers, text, texts
+from mjx_hand.files.json_text import read_json
 from mjx_hand.files.npz_archive import load_arrays, replacing, save_arrays
+from mjx_hand.files.npz_reader import Arrays
 from mjx_hand.motion.motion import LAYOUT, OFFSETS, Motion
 from mjx_hand.motion.scene import SIDES, Hinge, RecordedObject, RecordedScene, check_scene
 
@@ -25,8 +26,6 @@ _MESH: dict[str, tuple[int | str, ...]] = {"vertices": ("v", 3), "faces": ("f", 
 _HINGE: dict[str, tuple[int | str, ...]] = {"hinge_point": (3,), "hinge_axis": (3,), "hinge_angle": ("t",)}
 _END = 4096  # bytes
 _MOST = 1000  # objects; a damaged count is no reason to ask for a million arrays
-
-Arrays = Mapping[str, Any]
 
 
 def save_scene(scene: RecordedScene, path: str | Path) -> None:
@@ -55,7 +54,7 @@ def load_scene_file(path: str | Path) -> RecordedScene:
     """
     path = Path(path)
     arrays = load_arrays(path, SCHEMA) if path.suffix.lower() != ".json" else _json_arrays(path)
-    sides, names = _names(path, arrays, "hands"), _names(path, arrays, "objects")
+    sides, names = texts(path, arrays, "hands"), texts(path, arrays, "objects")
     if not set(sides) <= set(SIDES) or len(names) > _MOST:
         raise InputError(
             f"{path}: hands are {sides} and objects {len(names)}; expected right, left and at most {_MOST}"
@@ -96,6 +95,8 @@ def _arrays(scene: RecordedScene) -> dict[str, Any]:
         fields = [*LAYOUT, *OFFSETS, "source"]
         values = {field: getattr(motion, field) for field in fields if field != "fps"}
         arrays |= {f"{motion.side}_{field}": value for field, value in values.items() if value is not None}
+        if motion.warnings:
+            arrays[f"{motion.side}_warnings"] = np.array(motion.warnings)
     for k, found in enumerate(scene.objects):
         values = {field: getattr(found, field) for field in ("kind", *_POSES)}
         if found.kind == "mesh":
@@ -116,6 +117,7 @@ def _hand(path: Path, arrays: Arrays, side: str, fps: float) -> Motion:
         fps=fps,
         side=side,
         source=text(path, own, "source") if "source" in own else "",
+        warnings=texts(path, own, "warnings", needed=False),
         **{field: value.astype(bool if field == "valid" else float) for field, value in n.items()},
     )
 
@@ -140,22 +142,11 @@ def _object(path: Path, arrays: Arrays, k: int, name: str) -> RecordedObject:
 
 
 def _own(arrays: Arrays, prefix: str) -> dict[str, Any]:
-    return {name[len(prefix) :]: value for name, value in arrays.items() if name.startswith(prefix)}
-
-
-def _names(path: Path, arrays: Arrays, name: str) -> list[str]:
-    """A list of texts; an empty one may be of any type."""
-    found = np.asarray(arrays.get(name, ()))
-    if name not in arrays or found.ndim != 1 or (found.size and found.dtype.kind != "U"):
-        raise InputError(f"{path}: {name!r} is not a list of names; a scene needs fps, hands and objects")
-    return [str(each) for each in found]
+    return {name[len(prefix) :]: arrays[name] for name in arrays if name.startswith(prefix)}
 
 
 def _json_arrays(path: Path) -> dict[str, Any]:
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{path}: not readable JSON ({str(error).splitlines()[0]}); write it again") from None
+    found = read_json(path)
     if not isinstance(found, dict) or found.get("schema") != SCHEMA:
         raise InputError(f"{path}: not a scene; its 'schema' must be {SCHEMA!r}")
     try:

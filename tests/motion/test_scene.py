@@ -147,8 +147,8 @@ def test_meshes_in_millimetres_and_of_a_million_triangles(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"hands": ["both"]}, r"hands are \['both'\]"),
-        ({"hands": 3}, "'hands' is not a list of names"),
+        ({"hands": ["both"]}, r"hands are \('both',\)"),
+        ({"hands": 3}, "hands holds int64 of shape"),
         ({"objects": ["a", "b", "c"]}, "has no 'kind'"),
         ({"fps": 0}, "fps is 0"),
         ({"right_rotations": [[1, 2], [3]]}, "different lengths"),

@@ -13,7 +13,6 @@ The hands' UmeTrack parameters need no licensed file, and are what is read; MANO
 """
 
 import csv
-import json
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +20,14 @@ import numpy as np
 from jaxtyping import Float
 
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
-from mjx_hand.capture.datasets.mano_motion import LONGEST, chosen_side, hands_of, some
+from mjx_hand.capture.datasets.mano_motion import LONGEST, chosen_side, hands_of, refuse_wild, some
 from mjx_hand.capture.keypoint_fit.fit import KeypointSettings, fit_keypoints
 from mjx_hand.capture.keypoints.recording import KeypointRecording
 from mjx_hand.capture.keypoints.umetrack import NUM_ANGLES, umetrack_hand, umetrack_keypoints
 from mjx_hand.capture.object_poses.with_mesh import object_with_mesh
 from mjx_hand.errors import InputError
+from mjx_hand.files.input_file import check_input_file
+from mjx_hand.files.json_text import read_json
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion import Motion, RecordedObject, RecordedScene, make_scene
 from mjx_hand.motion.resample import quaternion_matrices
@@ -54,11 +55,11 @@ def _recognises(path: Path, contents: Contents) -> bool:
 def _lines(folder: Path) -> list[dict[str, Any]]:
     """The frames of the hands' file, by rising time."""
     path = folder / HANDS
+    found = read_json(path)
     try:
-        rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
-        rows = sorted(rows, key=lambda row: int(row["timestamp_ns"]))
+        rows = sorted(found if isinstance(found, list) else [found], key=lambda row: int(row["timestamp_ns"]))
         sound = all(isinstance(row["hand_poses"], dict) for row in rows)
-    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, OverflowError) as error:
         raise InputError(f"{path}: not HOT3D's lines of hand poses ({type(error).__name__}); get it again") from None
     if not rows or not sound:
         raise InputError(f"{path}: {len(rows)} lines of hand poses; get the file again")
@@ -88,6 +89,7 @@ def _read(path: Path, contents: Contents, request: Request) -> Motion:
     for frame, row in zip(frames, rows, strict=True):
         if _NUMBERS[side] in row["hand_poses"]:
             values[frame] = _hand(folder / HANDS, row["hand_poses"][_NUMBERS[side]], int(frame))
+    refuse_wild(path, values)
     length = np.linalg.norm(values[:, 3:7], axis=1)
     valid = some(path, np.asarray(np.isfinite(values).all(axis=1) & (np.abs(length - 1) < 0.01)))
     known = values[valid]
@@ -124,13 +126,9 @@ def _hand(path: Path, hand: Any, frame: int) -> Float[Array, "27"]:
 
 def _profile(folder: Path) -> dict[str, Any]:
     path = folder / PROFILE
-    if not path.is_file():
-        raise InputError(f"{path}: no such file; the user's profile stands beside {HANDS}")
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-        model = found.get("hand_model") if isinstance(found, dict) else None
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{path}: not readable JSON ({type(error).__name__}); get it again") from None
+    check_input_file(path, f"the user's profile stands beside {HANDS}")
+    found = read_json(path)
+    model = found.get("hand_model") if isinstance(found, dict) else None
     if not isinstance(model, dict):
         raise InputError(f"{path}: has no 'hand_model'; get HOT3D's own profile of the user")
     return model
@@ -149,7 +147,7 @@ def _objects(folder: Path, first: int, count: int, rate: float) -> tuple[Recorde
                 if 0 <= frame < count:
                     own = poses.setdefault(row["object_uid"].strip(), np.full((count, 7), np.nan))
                     own[frame] = [float(row[name] or "nan") for name in _POSE]
-    except (KeyError, TypeError, ValueError, AttributeError, csv.Error) as error:
+    except (OSError, KeyError, TypeError, ValueError, AttributeError, OverflowError, csv.Error) as error:
         raise InputError(f"{path}: not HOT3D's table of object poses ({type(error).__name__}); get it again") from None
     names = _instances(folder)
     seen = {uid: own for uid, own in poses.items() if np.isfinite(own).all(axis=1).any()}
@@ -164,10 +162,10 @@ def _instances(folder: Path) -> dict[str, str]:
     path = _library_file(folder, "instance.json")
     if path is None:
         return {}
+    found = read_json(path)
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
         return {uid: str(about["instance_name"]) for uid, about in found.items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{path}: not HOT3D's list of objects ({type(error).__name__}); get it again") from None
 
 

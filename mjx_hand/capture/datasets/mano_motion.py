@@ -57,7 +57,9 @@ def hands_of(
     Raises:
         InputError: none is there, the one asked for is not, or a hand cannot be read.
     """
-    sides = present if request.side is None and len(present) > 1 else [chosen_side(path, present, request)]
+    first = dataclasses.replace(request, side=request.side or next(iter(present), None))
+    one = chosen_side(path, present, first)
+    sides = [one] if request.side is not None else list(dict.fromkeys(present))
     if len(sides) > 1 and request.mano is not None and not request.mano.is_dir():
         raise InputError(
             f"{path}: holds both hands, and {request.mano} is the file of one; give the folder of MANO_RIGHT.pkl and "

@@ -21,16 +21,19 @@ _LAYOUT: dict[str, tuple[int | str, ...]] = {"object_pose_objcam": ("t", 3, 4), 
 _FEW_DIGITS = 0.05
 
 
-def recording_files(folder: str | Path) -> tuple[Path, Path]:
-    """The `.npz` and the `.stl` of a recording's folder.
+def recording_files(folder: str | Path) -> tuple[Path, ...]:
+    """The `.npz` and the `.stl` of a recording's folder; of a scene's file, that file.
 
     Raises:
         InputError: there is no such folder, or it does not hold one of each.
     """
     folder = Path(folder)
+    if folder.is_file():
+        return (folder,)
     if not folder.is_dir():
         raise InputError(
-            f"{folder}: no such folder; give the folder of a DexMV recording, with its .npz and a mesh, .stl"
+            f"{folder}: no such folder; give the folder of a DexMV recording, with its .npz and a mesh, .stl, or a "
+            "scene's file"
         )
     found = []
     for ending in ("npz", "stl"):
@@ -38,7 +41,7 @@ def recording_files(folder: str | Path) -> tuple[Path, Path]:
         if len(files) != 1:
             raise InputError(f"{folder}: holds {len(files)} .{ending} files; a recording has one .npz and one .stl")
         found.append(files[0])
-    return found[0], found[1]
+    return tuple(found)
 
 
 def dexmv_objects(path: Path, arrays: Mapping[str, Any], frames: int) -> tuple[RecordedObject, ...]:
@@ -62,7 +65,7 @@ def dexmv_objects(path: Path, arrays: Mapping[str, Any], frames: int) -> tuple[R
     pose[:, :3] = n["object_pose_objcam"]
     if len(pose) < frames:
         raise InputError(f"{path}: has {len(pose)} poses of the object for {frames} frames; get the file again")
-    meshes = sorted(path.absolute().parent.glob("*.stl"))
+    meshes = sorted(file for file in path.absolute().parent.iterdir() if file.suffix.lower() == ".stl")
     if len(meshes) > 1:
         raise InputError(f"{path.absolute().parent}: holds {len(meshes)} .stl files; keep the recording's object alone")
     mesh = meshes[0] if meshes else None

@@ -7,19 +7,21 @@ are gaps. Times count from the first row, at which the hand's recording begins t
 """
 
 import csv
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from jaxtyping import Float
 
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import numbers
-from mjx_hand.files.npz_archive import open_arrays
+from mjx_hand.files.input_file import check_input_file
+from mjx_hand.files.json_text import read_json
+from mjx_hand.files.npz_archive import open_archive
+from mjx_hand.files.npz_reader import Arrays
+from mjx_hand.files.safe_yaml import read_yaml
 from mjx_hand.motion import RecordedObject
 from mjx_hand.motion.make_scene import poses_at, resample_object
 from mjx_hand.pytree import replace
@@ -54,12 +56,13 @@ def load_poses(path: str | Path) -> PoseTrack:
     """
     path = Path(path)
     suffix = path.suffix.lower()
-    if not path.is_file() or suffix not in _SUFFIXES:
-        found = "no such file" if not path.is_file() else f"suffix {suffix or 'none'}"
-        raise InputError(f"{path}: {found}; poses of an object are {', '.join(_SUFFIXES)} (docs/scenes.md)")
+    give = f"poses of an object are {', '.join(_SUFFIXES)} (docs/scenes.md)"
+    check_input_file(path, give)
+    if suffix not in _SUFFIXES:
+        raise InputError(f"{path}: suffix {suffix or 'none'}; {give}")
     if suffix == ".csv":
         return _table(path)
-    arrays = _json(path) if suffix == ".json" else open_arrays(path) if suffix == ".npz" else {"poses": _array(path)}
+    arrays = _json(path) if suffix == ".json" else open_archive(path) if suffix == ".npz" else {"poses": _array(path)}
     if "poses" not in arrays and {"position", "quaternion"} <= set(arrays):
         n = numbers(path, arrays, {"position": ("t", 3), "quaternion": ("t", 4)}, finite=False)
         poses = np.concatenate([n["position"], n["quaternion"]], axis=1).astype(float)
@@ -115,10 +118,8 @@ def marker_places(path: str | Path, labels: Sequence[str]) -> Float[Array, "m 3"
         InputError: it is not readable, or lacks one of the markers.
     """
     path = Path(path)
-    try:
-        found = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise InputError(f"{path}: not readable YAML ({' '.join(str(error).split())[:200]})") from None
+    check_input_file(path, "give the markers' places, 'marker: [x, y, z]' in metres")
+    found = read_yaml(path)
     missing = [label for label in labels if not isinstance(found, dict) or label not in found]
     if missing:
         raise InputError(f"{path}: has no place of marker {missing[0]!r}; write '{missing[0]}: [x, y, z]', in metres")
@@ -159,12 +160,14 @@ def _checked(path: Path, track: PoseTrack) -> PoseTrack:
     return track
 
 
-def _json(path: Path) -> dict[str, Any]:
+def _json(path: Path) -> Arrays:
+    found = read_json(path)
+    if not isinstance(found, dict):
+        raise InputError(f"{path}: is no object of named arrays, 'poses' among them")
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
         return {name: np.asarray(_missing(value)) for name, value in found.items()}
-    except (OSError, ValueError, AttributeError, RecursionError) as error:
-        raise InputError(f"{path}: not a readable JSON object of arrays ({str(error).splitlines()[0]})") from None
+    except ValueError:
+        raise InputError(f"{path}: an array has rows of different lengths; write it again") from None
 
 
 def _missing(value: Any) -> Any:
@@ -178,5 +181,5 @@ def _array(path: Path) -> Array:
     try:
         with path.open("rb") as file:
             return np.lib.format.read_array(file, allow_pickle=False)
-    except (ValueError, OSError, EOFError) as error:
-        raise InputError(f"{path}: not a readable .npy array ({str(error).splitlines()[0]})") from None
+    except Exception as error:  # damaged bytes raise anything at all
+        raise InputError(f"{path}: not a readable .npy array ({type(error).__name__}); write it again") from None

@@ -12,12 +12,18 @@ Array = np.ndarray
 
 
 def object_with_mesh(
-    name: str, poses: Float[Array, "t *d"], mesh: Path | None, seen: Bool[Array, "t"] | None = None
+    name: str, poses: Float[Array, "t *d"], mesh: Path | None, *, unit: str = "m", seen: Bool[Array, "t"] | None = None
 ) -> RecordedObject:
     """A data set's object, with its mesh where the file is there; without it, the poses alone.
+
+    Args:
+        name: of the object.
+        poses, seen: as `recorded_object` takes them.
+        mesh: the file, there or not.
+        unit: of its numbers.
 
     Raises:
         InputError: poses or mesh cannot be used.
     """
-    surface = read_object_mesh(mesh) if mesh is not None and mesh.is_file() else None
+    surface = read_object_mesh(mesh, unit) if mesh is not None and mesh.is_file() else None
     return recorded_object(name, poses, mesh=surface, seen=seen)

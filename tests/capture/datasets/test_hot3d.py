@@ -181,7 +181,7 @@ def test_made_recordings_come_back_with_their_gaps(tmp_path):
 @pytest.mark.parametrize(
     ("file", "content", "message"),
     [
-        ("umetrack_hand_pose_trajectory.jsonl", "{", "not HOT3D's lines"),
+        ("umetrack_hand_pose_trajectory.jsonl", "{", "not a readable .jsonl file"),
         ("umetrack_hand_pose_trajectory.jsonl", '{"timestamp_ns": 1, "hand_poses": {"1": {}}}', "1 time stamps"),
         ("umetrack_hand_user_profile.json", "[]", "has no 'hand_model'"),
         ("umetrack_hand_user_profile.json", '{"hand_model": {"joint_limits": [1, [2]]}}', "no tables of numbers"),
