@@ -15,11 +15,11 @@ from mjx_hand.capture.load_scene import load_scene
 from mjx_hand.capture.marker_files.load_markers import marker_format_of
 from mjx_hand.capture.markers.marker_recording import SCHEMA as MARKERS
 from mjx_hand.capture.unread import described_for_reading
-from mjx_hand.cli import facts_of
-from mjx_hand.cli.keypoint_facts import keypoint_facts
-from mjx_hand.cli.scene_facts import scene_facts
-from mjx_hand.cli.wording import as_options
-from mjx_hand.cli.yaml_facts import yaml_facts
+from mjx_hand.cli.facts import facts_of
+from mjx_hand.cli.facts.keypoint_facts import keypoint_facts
+from mjx_hand.cli.facts.scene_facts import scene_facts
+from mjx_hand.cli.facts.yaml_facts import yaml_facts
+from mjx_hand.cli.terminal.wording import as_options
 from mjx_hand.errors import InputError
 from mjx_hand.files.contents import read_contents
 from mjx_hand.files.input_file import check_input_file

@@ -10,8 +10,8 @@ from mjx_hand.capture.load_scene import load_scene
 from mjx_hand.capture.marker_files.load_markers import load_markers
 from mjx_hand.capture.object_poses.marker_cluster import track_cluster
 from mjx_hand.capture.object_poses.pose_file import PoseTrack, in_frames, load_poses, marker_places
+from mjx_hand.cli.facts.scene_facts import scene_facts
 from mjx_hand.cli.object_options import Shape, by_name, shape_of
-from mjx_hand.cli.scene_facts import scene_facts
 from mjx_hand.errors import InputError
 from mjx_hand.motion import RecordedObject, RecordedScene, make_scene, recorded_object, save_scene
 from mjx_hand.motion.make_scene import first_poses, up_vector

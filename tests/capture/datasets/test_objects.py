@@ -62,6 +62,7 @@ def test_objects_of_grab(tmp_path):
 
 def test_objects_of_arctic(tmp_path):
     """Its top part turns about (0, 0, -1) first, then both are turned and moved; all in millimetres."""
+    (tmp_path / "raw_seqs").mkdir()
     path = test_arctic.write(
         tmp_path / "raw_seqs", right=test_arctic.hand_of("right"), left=test_arctic.hand_of("left")
     )

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mjx_hand.cli import facts_of
+from mjx_hand.cli.facts import facts_of
 from mjx_hand.motion import RecordedObject, RecordedScene
 from mjx_hand.motion.scene import NO_SURFACE
 from mjx_hand.motion.scene_notes import scene_notes, wrist_distance
