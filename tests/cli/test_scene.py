@@ -13,7 +13,7 @@ from mjx_hand.cli import view as view_command
 from mjx_hand.cli.main import main
 from mjx_hand.motion import load_scene_file, save_motion, save_scene
 from mjx_hand.pytree import replace
-from mjx_hand.view.browser.scene import check_scene
+from mjx_hand.view.browser.scene import MeshLayer, check_scene
 from tests.motion.scenes import FPS, FRAMES, poses, scene, still_hand
 
 COLUMNS = "time,x,y,z,qw,qx,qy,qz"
@@ -154,6 +154,7 @@ def test_info_and_view(tmp_path, capsys):
     assert [layer.name for layer in shown.layers] == ["right hand", "left hand", "object box", "object wedge"]
     assert shown.up == "+z"
     box = shown.layers[2]
+    assert isinstance(box, MeshLayer)
     turned = scene().object("box").position @ np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
     np.testing.assert_allclose(box.transforms[:, 0, :3, 3], turned, atol=1e-12)  # y is up: it becomes z
     assert len(shown.curves) == 4

@@ -35,6 +35,7 @@ _LAYOUT: dict[str, tuple[int | str, ...]] = {
 _LANDMARKS = (5, -1, 6, 7, 0, 8, 9, 10, 1, 11, 12, 13, 2, 14, 15, 16, 3, 17, 18, 19, 4)
 _BASE = 1  # that keypoint
 _GRID, _GRID_SHARE = 7, 0.1  # angles of each of the thumb's first hinges; their say beside the recording's frames
+_REACH = 0.03  # m that the thumb's base may be from its first hinge
 
 
 @dataclass(frozen=True)
@@ -147,5 +148,6 @@ def _thumb_base(hand: UmeTrackHand, next_joint: Float[Array, "t 3"]) -> Float[Ar
     def off(x: Float[Array, "4"]) -> Float[Array, "n"]:
         return 1e3 * weight * (np.linalg.norm(places - x[:3], axis=1) - x[3])
 
-    start = hand.points[0]
-    return least_squares(off, [*start, np.linalg.norm(places - start, axis=1).mean()]).x[:3]
+    start = np.append(hand.points[0], np.linalg.norm(places - hand.points[0], axis=1).mean())
+    # Hinges that are nearly parallel move the joint on an arc, of which any far point is a centre: it stays near them.
+    return least_squares(off, start, bounds=(start - _REACH, start + _REACH)).x[:3]

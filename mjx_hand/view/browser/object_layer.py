@@ -1,6 +1,7 @@
 """A scene's objects as layers for the viewer."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -54,6 +55,6 @@ def _mesh(found: RecordedObject) -> Mesh:
     if found.kind == "mesh":
         return found.vertices, found.faces
     if found.kind == NO_SURFACE:
-        cross = trimesh.creation.axis(origin_size=_AXES / 10, axis_length=_AXES)
+        cross: Any = trimesh.creation.axis(origin_size=_AXES / 10, axis_length=_AXES)
         return np.asarray(cross.vertices), np.asarray(cross.faces)
     return object_mesh(ObjectDescription(size=found.size, mass=1.0, friction=1.0, kind=found.kind))

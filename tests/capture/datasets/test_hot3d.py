@@ -109,7 +109,7 @@ def made_model() -> dict:
     axes, points, parents, bones, tips = [], [], [], [], []
     for f in range(5):
         for k in range(4):
-            axes.append([0.0, -1, 0] if k == 0 else flexion[f])
+            axes.append(([0.4, 0.3, -1] if f == 0 else [0.0, -1, 0]) if k == 0 else flexion[f])
             points.append((base[f] + reach[f][k] * along[f]).tolist())
             parents.append(255 if k == 0 else 4 * f + k - 1)
             bones.append(255 if k == 0 else 1 + 3 * f + k)

@@ -32,8 +32,10 @@ def recording(places: np.ndarray, noise: float = 0.0) -> MarkerRecording:
 def off(poses: np.ndarray) -> tuple[float, float]:
     """Greatest distance (m) and angle (rad) from the truth, where there is a pose."""
     turn, place = motion()
-    seen = np.isfinite(poses).all(axis=1)
-    angle = (turn[seen].inv() * Rotation.from_quat(poses[seen, 3:], scalar_first=True)).magnitude()
+    (seen,) = np.nonzero(np.isfinite(poses).all(axis=1))
+    angle = (
+        Rotation.from_quat(turn.as_quat()[seen]).inv() * Rotation.from_quat(poses[seen, 3:], scalar_first=True)
+    ).magnitude()
     return float(np.linalg.norm(poses[seen, :3] - place[seen], axis=1).max()), float(angle.max())
 
 
