@@ -66,24 +66,15 @@ def make_reference(
     _check(demonstrations)
     forces = _grip_forces(demonstrations, grip_force)
     frames = max(d.num_frames for d in demonstrations)
-    targets, poses, bases, relative = [], [], [], []
+    targets, poses, bases = [], [], []
     for d in demonstrations:
         base = base_rotation(d)
         wrist = wrist_coordinates(d.motion.wrist_position, d.motion.wrist_quaternion, base)
         targets.append(_padded(np.concatenate([wrist, d.motion.angles], axis=1), frames))
         poses.append(_padded(d.object_pose, frames))
         bases.append(base)
-        relative.append([_padded(rows, frames) for rows in object_in_hand(d)])
     targets = jnp.asarray(np.stack(targets), jnp.float32)
-    rotation = jnp.asarray(np.stack([r for r, _ in relative]), jnp.float32)
-    position = jnp.asarray(np.stack([p for _, p in relative]), jnp.float32)
-    grip = jnp.zeros_like(targets)
-    for kind in OBJECT_KINDS:  # the shape is compiled in, so each kind's grips are worked out together
-        rows = np.array([k for k, d in enumerate(demonstrations) if d.object.kind == kind and forces[k] > 0], int)
-        if rows.size:
-            seen = (targets[rows, :, NUM_WRIST:], rotation[rows], position[rows])
-            chosen = [demonstrations[k].object for k in rows], [hands[k] for k in rows]
-            grip = grip.at[rows, :, NUM_WRIST:].set(_grips(kind, *seen, *chosen, forces[rows], gains))
+    grip = grip_table(demonstrations, hands, targets, np.where(forces > 0, forces, np.nan), gains)
     features = [[*d.object.size, d.object.mass, d.object.friction, *_one_of_kinds(d)] for d in demonstrations]
     return Reference(
         targets=targets,
@@ -95,6 +86,28 @@ def make_reference(
         features=jnp.asarray(features, jnp.float32),
         length=jnp.array([d.num_frames for d in demonstrations]),
     )
+
+
+def grip_table(
+    demonstrations: Sequence[Demonstration],
+    hands: Sequence[RigidHand],
+    targets: Float[Array, "d t 26"],
+    forces: Float[np.ndarray, "d"],
+    gains: Gains,
+) -> Float[Array, "d t 26"]:
+    """The grip (m, rad) of each demonstration at a force (N); NaN leaves it as it is."""
+    frames = targets.shape[1]
+    relative = [[_padded(rows, frames) for rows in object_in_hand(d)] for d in demonstrations]
+    rotation = jnp.asarray(np.stack([r for r, _ in relative]), jnp.float32)
+    position = jnp.asarray(np.stack([p for _, p in relative]), jnp.float32)
+    grip = jnp.zeros_like(targets)
+    for kind in OBJECT_KINDS:  # the shape is compiled in, so each kind's grips are worked out together
+        rows = np.array([k for k, d in enumerate(demonstrations) if d.object.kind == kind and forces[k] >= 0], int)
+        if rows.size:
+            seen = (targets[rows, :, NUM_WRIST:], rotation[rows], position[rows])
+            chosen = [demonstrations[k].object for k in rows], [hands[k] for k in rows]
+            grip = grip.at[rows, :, NUM_WRIST:].set(_grips(kind, *seen, *chosen, forces[rows], gains))
+    return grip
 
 
 def object_in_hand(demonstration: Demonstration) -> tuple[Float[np.ndarray, "t 3 3"], Float[np.ndarray, "t 3"]]:

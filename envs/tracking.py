@@ -86,6 +86,7 @@ class TrackingEnv(Env):
 
     Attributes:
         demonstrations, hands: what it was built over.
+        gains: of the hand's position controllers.
         models: MuJoCo's of each demonstration's scene.
         tables: what it looks up; `with_tables` puts another set's in their place.
 
@@ -103,7 +104,7 @@ class TrackingEnv(Env):
     ):
         self.demonstrations, self.hands = tuple(demonstrations), tuple(hands)
         self.task = Task() if task is None else task
-        gains = Gains() if gains is None else gains
+        self.gains = gains = Gains() if gains is None else gains
         reference = _cached_reference(demonstrations, hands, self.task.grip_force, gains)
         self.assisted = self.task.assist > 0
         self.models = demonstration_models(demonstrations, hands, gains=gains, assisted=self.assisted)

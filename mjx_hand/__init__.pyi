@@ -3,6 +3,7 @@ from mjx_hand.capture.keypoint_fit.fit import fit_keypoints as fit_keypoints
 from mjx_hand.capture.keypoints.recording import KeypointRecording as KeypointRecording
 from mjx_hand.capture.keypoints.recording import save_keypoints as save_keypoints
 from mjx_hand.capture.load import load_motion as load_motion
+from mjx_hand.capture.load_scene import load_scene as load_scene
 from mjx_hand.capture.marker_files.load_markers import load_markers as load_markers
 from mjx_hand.capture.marker_fit.fit import fit_markers as fit_markers
 from mjx_hand.capture.markers.marker_recording import MarkerRecording as MarkerRecording
@@ -17,8 +18,13 @@ from mjx_hand.motion.demonstration import save_demonstration as save_demonstrati
 from mjx_hand.motion.joint_motion import JointMotion as JointMotion
 from mjx_hand.motion.joint_motion import load_joint_motion as load_joint_motion
 from mjx_hand.motion.joint_motion import save_joint_motion as save_joint_motion
+from mjx_hand.motion.make_scene import make_scene as make_scene
+from mjx_hand.motion.make_scene import recorded_object as recorded_object
 from mjx_hand.motion.motion import Motion as Motion
 from mjx_hand.motion.motion import save_motion as save_motion
+from mjx_hand.motion.scene import RecordedObject as RecordedObject
+from mjx_hand.motion.scene import RecordedScene as RecordedScene
+from mjx_hand.motion.scene_file import save_scene as save_scene
 from mjx_hand.objects.convex_decomposition import convex_pieces as convex_pieces
 from mjx_hand.objects.description import ObjectDescription as ObjectDescription
 from mjx_hand.player.exported_policy import ExportedPolicy as ExportedPolicy

@@ -28,7 +28,7 @@ from mjx_hand.retarget.sequence import RetargetErrors, retarget_errors, retarget
 from mjx_hand.view.figures import plots
 from mjx_hand.view.report import Film, Headline, Plot, Report, Section, write_report
 from train.evaluate import show
-from train.experiment.evaluate_seeds import POLICY, REPLAY, ZERO, Results, evaluate_seeds, median_and_worst
+from train.experiment.evaluate_seeds import POLICY, PRESS, REPLAY, ZERO, Results, evaluate_seeds, median_and_worst
 from train.experiment.setup import load_env
 from train.learning.curve import Point
 from train.ppo import train
@@ -123,8 +123,9 @@ def _report(
             ),
             Headline(
                 "without learning",
-                f"{100 * rows[REPLAY]['manip_trans_object']:.0f} %",
-                f"demonstration alone; {100 * rows[ZERO]['manip_trans_object']:.0f} % with fingers pressed",
+                f"{100 * rows[PRESS]['manip_trans_object']:.0f} %",
+                f"constant press; zero residual {100 * rows[ZERO]['manip_trans_object']:.0f} %, "
+                f"demonstration alone {100 * rows[REPLAY]['manip_trans_object']:.0f} %",
             ),
             Headline("training", clock(points[-1].seconds), f"{points[-1].steps:,} control steps"),
         ),

@@ -1,9 +1,9 @@
 """Evaluate checkpoints on held-out demonstrations: `mjx-hand evaluate config=pinch seeds=[0,1,2]`.
 
-Every rollout counts, from frame 0, unassisted. Beside the policies, the best of each seed, stand two baselines without
-learning: the same reference with a residual of zero, and the demonstration replayed as it is. Writes `evaluation.html`,
-`evaluation.json`, `evaluation.csv` (a row a rollout), `worst.mp4` and `median.mp4` to the seed's `out` folder, or to
-the one above those of several seeds.
+Every rollout counts, from frame 0, unassisted. Beside the policies, the best of each seed, stand baselines without
+learning: one constant press for each grasp type, the reference with a residual of zero, and the demonstration replayed
+as it is. Writes `evaluation.html`, `evaluation.json`, `evaluation.csv` (a row a rollout), `worst.mp4` and `median.mp4`
+to the seed's `out` folder, or to the one above those of several seeds.
 """
 
 from collections.abc import Sequence

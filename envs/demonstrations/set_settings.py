@@ -10,14 +10,14 @@ from envs.demonstrations.from_recording.demonstration import RECORDED
 from envs.demonstrations.from_recording.variations import RecordingSettings
 from envs.demonstrations.scripted.simulated_capture import CaptureSettings
 from envs.grasps import grasp_names, grasp_type
-from mjx_hand.capture.datasets.dexmv_object import recording_files
+from mjx_hand.capture.object_poses.dexmv_object import recording_files
 from mjx_hand.errors import InputError
 from mjx_hand.objects.mesh_file import mesh_digest
 
 ALL = "all"
 GIVEN = "given"
 _VERSION = 3  # of the generator: a change that makes other demonstrations of the same settings raises it
-_RECORDED_VERSION = 3  # the same of what is made of a recording
+_RECORDED_VERSION = 4  # the same of what is made of a recording
 
 
 @dataclasses.dataclass(frozen=True)
@@ -124,7 +124,7 @@ def fingerprint(settings: SetSettings) -> dict[str, Any]:
     return told
 
 
-def _recording_files(settings: RecordingSettings) -> tuple[Path, Path]:
+def _recording_files(settings: RecordingSettings) -> tuple[Path, ...]:
     try:
         return recording_files(settings.path)
     except InputError as error:

@@ -27,8 +27,11 @@ def make_roll_out(
     policy: Callable[[object, Array], Array],
     hold: float = 0.0,
     repeats: int = 1,
-) -> Callable[[object], Rollouts]:
+) -> Callable[..., Rollouts]:
     """A function from a policy's parameters to the rollouts of every demonstration of `env`; compiled once.
+
+    Its other argument, if given, are tables to take the place of the environment's: other controls of the same
+    demonstrations.
 
     Nothing ends a rollout early: a dropped object counts in every frame after it. All rollouts run side by side.
 
@@ -78,8 +81,8 @@ def make_roll_out(
     counted = time < length[:, None]
     held = (time >= length[:, None]) & (time < length[:, None] + round(hold * env.fps))
 
-    def roll_out(parameters: object) -> Rollouts:
-        qpos, sensors, reward = run(parameters, env.tables)
+    def roll_out(parameters: object, tables: Tables | None = None) -> Rollouts:
+        qpos, sensors, reward = run(parameters, env.tables if tables is None else tables)
         joints, _ = centres(qpos[..., :_NUM_TARGETS], base, bodies)
         return Rollouts(
             demonstration=which,

@@ -9,7 +9,11 @@ at the base, and the two hinges outwards.
 
 import dataclasses
 
+import numpy as np
+from jaxtyping import Float
+
 from mjx_hand.errors import InputError
+from mjx_hand.hand.joints import FINGERS
 from mjx_hand.objects.description import OBJECT_KINDS
 
 Vector = tuple[float, float, float]
@@ -124,3 +128,9 @@ class GraspType:
                 f"grasp type {self.name!r}: object_kind is {self.object_kind!r}, but scripted grasps draw objects by "
                 f"their size; valid: {', '.join(SCRIPTED_KINDS)} (a mesh takes their place by data.object=FILE)"
             )
+
+
+def wrap_torque(closing: Wrap) -> Float[np.ndarray, "20"]:
+    """The torques (N m) of all hinges with which a wrap closes, in the order of `hand.joints.HINGES`."""
+    each = [closing.thumb_torque if finger == "thumb" else closing.finger_torque for finger in FINGERS]
+    return np.concatenate([[0.0, *torque] for torque in each])

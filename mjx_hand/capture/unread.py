@@ -24,7 +24,7 @@ def described_for_reading(path: Path, contents: Mapping[str, Any]) -> str:
         return f"a folder of no layout that is known here: {described(path)}"
     found = keypoint_contents(path, contents)
     lines = found if isinstance(found, list) else [found]
-    name = "HOT3D's hand poses, of which no reader is here: " if _is_hot3d(lines) else ""
+    name = "HOT3D's hand poses, which are read from its folder, by UmeTrack's file: " if _is_hot3d(lines) else ""
     return f"{name}{described(path, found if found is not None else contents)}; {NEAREST}"
 
 

@@ -11,13 +11,15 @@ from mjx_hand.capture.datasets.dataset_format import dataset_formats
 from mjx_hand.capture.datasets.keypoints import FORMAT as KEYPOINTS
 from mjx_hand.capture.keypoint_files.load_keypoints import keypoint_contents, recognised
 from mjx_hand.capture.load import load_motion
+from mjx_hand.capture.load_scene import load_scene
 from mjx_hand.capture.marker_files.load_markers import marker_format_of
 from mjx_hand.capture.markers.marker_recording import SCHEMA as MARKERS
 from mjx_hand.capture.unread import described_for_reading
-from mjx_hand.cli import facts_of
-from mjx_hand.cli.keypoint_facts import keypoint_facts
-from mjx_hand.cli.wording import as_options
-from mjx_hand.cli.yaml_facts import yaml_facts
+from mjx_hand.cli.facts import facts_of
+from mjx_hand.cli.facts.keypoint_facts import keypoint_facts
+from mjx_hand.cli.facts.scene_facts import scene_facts
+from mjx_hand.cli.facts.yaml_facts import yaml_facts
+from mjx_hand.cli.terminal.wording import as_options
 from mjx_hand.errors import InputError
 from mjx_hand.files.contents import read_contents
 from mjx_hand.files.input_file import check_input_file
@@ -138,6 +140,10 @@ def _motion(
     said = {"side": side, "sequence": sequence, "mano": mano, "fps": fps}
     choice = "".join(f" --{name} {_quoted(value)}" for name, value in said.items() if value is not None)
     try:
+        if known.read_scene is not None:
+            found = load_scene(path, side=side, sequence=sequence, mano=mano, fps=fps)
+            commands = (f"mjx-hand view {_quoted(path)}{choice}", _scene_command(path, choice, len(found.hands)))
+            return FileFacts(known.name, scene_facts(found), commands)
         motion = load_motion(path, side=side, sequence=sequence, mano=mano, fps=fps)
     except InputError as error:
         # Of a known format, but it takes a choice to read it, or it is not sound: its own line says which.
@@ -146,6 +152,12 @@ def _motion(
     file = _quoted(path)
     commands = (f"mjx-hand view {file}{choice}", f"mjx-hand retarget {file} --out angles.npz{choice}")
     return FileFacts(known.name, facts_of.motion(motion), commands)
+
+
+def _scene_command(path: Path, choice: str, hands: int) -> str:
+    if hands == 1:
+        return f"mjx-hand retarget {_quoted(path)} --out angles.npz{choice}"
+    return f"mjx-hand scene {_quoted(path)} --out scene.npz{choice}"
 
 
 def _mano(path: Path, contents: Mapping[str, Any]) -> FileFacts | None:

@@ -11,11 +11,11 @@ import tyro
 
 from mjx_hand.cli.plugin_commands import plugin_commands, run_plugin, summary
 from mjx_hand.cli.terminal.usage import later, parsed
-from mjx_hand.cli.wording import as_options
+from mjx_hand.cli.terminal.wording import as_options
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 
-COMMANDS = ("build", "fit", "info", "keypoints", "retarget", "robot", "track", "view")
+COMMANDS = ("build", "fit", "info", "keypoints", "retarget", "robot", "scene", "track", "view")
 
 
 def _function(command: str) -> Callable[..., Any]:

@@ -12,7 +12,7 @@ import tyro
 from mjx_hand.capture.datasets.dataset_format import dataset_formats
 from mjx_hand.capture.load import load_motion
 from mjx_hand.cli.output import check_out, print_table, print_warnings, spread
-from mjx_hand.cli.wording import as_options
+from mjx_hand.cli.terminal.wording import as_options
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import LINKS, ONE_DOF, TWO_DOF
 from mjx_hand.motion import Motion, save_joint_motion

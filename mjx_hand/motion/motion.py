@@ -21,7 +21,7 @@ LAYOUT: dict[str, tuple[int | str, ...]] = {
     "valid": ("t",),
 }
 _BY_FRAME = {"rotations": np.eye(3), "wrist_position": np.zeros(3), "wrist_quaternion": np.array([1.0, 0, 0, 0])}
-_OFFSETS = {"link_offset": NUM_LINKS, "tip_offset": len(FINGERS)}  # a recording may have them
+OFFSETS = {"link_offset": NUM_LINKS, "tip_offset": len(FINGERS)}  # a recording may have them
 
 
 @pytree
@@ -105,7 +105,7 @@ def check_motion(motion: Motion, name: str = "") -> Motion:
         raise InputError(f"{name}: frame {worst}'s wrist_quaternion has length {length[worst]:.3g}, expected 1 (wxyz)")
     if np.ndim(motion.shape) != 1 or not np.isfinite(motion.shape).all():
         raise InputError(f"{name}: shape has dimensions {np.shape(motion.shape)}; expected a list of finite numbers")
-    for field, rows in _OFFSETS.items():
+    for field, rows in OFFSETS.items():
         offset = getattr(motion, field)
         if offset is not None and (np.shape(offset) != (rows, 3) or not np.isfinite(offset).all()):
             raise InputError(f"{name}: {field} has shape {np.shape(offset)}; expected ({rows}, 3), all finite")
@@ -132,7 +132,7 @@ def save_motion(motion: Motion, path: str | Path) -> None:
     }
     if motion.warnings:
         arrays["warnings"] = np.array(motion.warnings)
-    for field in _OFFSETS:
+    for field in OFFSETS:
         if getattr(motion, field) is not None:
             arrays[field] = getattr(motion, field)
     save_arrays(path, SCHEMA, arrays)
@@ -146,7 +146,7 @@ def load_motion_file(path: str | Path) -> Motion:
     """
     a = load_arrays(path, SCHEMA)
     n = numbers(path, _without_bad_frames(numbers(path, a, LAYOUT, finite=False)), LAYOUT)
-    offsets = numbers(path, a, {field: (rows, 3) for field, rows in _OFFSETS.items() if field in a})
+    offsets = numbers(path, a, {field: (rows, 3) for field, rows in OFFSETS.items() if field in a})
     return check_motion(
         Motion(
             fps=float(n["fps"]),

@@ -13,6 +13,7 @@ from mjx_hand.objects.description import ObjectDescription
 
 _EXTENT = (0.005, 1.0)  # m: what one hand holds is neither shorter along every axis nor longer along one
 _MOST_FACES = 200_000  # convex decomposition of more takes minutes, and its pieces are no better
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}  # of a mesh file, which says none, in metres
 
 
 def read_mesh(path: str | Path) -> tuple[Float[np.ndarray, "v 3"], Int[np.ndarray, "f 3"]]:
@@ -49,6 +50,35 @@ def mesh_digest(path: str | Path) -> str:
         ) from None
 
 
+def read_object_mesh(path: str | Path, unit: str = "m") -> tuple[Float[np.ndarray, "v 3"], Int[np.ndarray, "f 3"]]:
+    """Vertices (m) and triangles of a mesh file, if they are of something that a hand holds.
+
+    Args:
+        path: of the mesh.
+        unit: of its numbers: m, cm, mm or in.
+
+    Raises:
+        InputError: as `read_mesh`; a unit that is not known; a size that no hand holds, or far too many triangles.
+    """
+    if unit not in UNITS:
+        raise InputError(f"{path}: unit {unit!r} is not known; valid: {', '.join(UNITS)}")
+    vertices, faces = read_mesh(path)
+    vertices = vertices * UNITS[unit]
+    longest = float(np.ptp(vertices, axis=0).max())
+    if not _EXTENT[0] <= longest <= _EXTENT[1]:
+        guess = longest / 1000
+        hint = " (in millimetres? scale it by 0.001)" if _EXTENT[0] <= guess <= _EXTENT[1] else ""
+        raise InputError(
+            f"{path}: {longest:.4g} m long, but an object in a hand is {_EXTENT[0]:g} to {_EXTENT[1]:g} m{hint}"
+        )
+    if len(faces) > _MOST_FACES:
+        raise InputError(
+            f"{path}: {len(faces):,} triangles; at most {_MOST_FACES:,} are taken: simplify the mesh first "
+            "(trimesh's simplify_quadric_decimation, MeshLab, Blender's Decimate)"
+        )
+    return vertices, faces
+
+
 def object_from_mesh(
     path: str | Path, *, mass: float | None = None, density: float | None = None, friction: float = 0.9
 ) -> ObjectDescription:
@@ -61,27 +91,15 @@ def object_from_mesh(
         friction: sliding coefficient.
 
     Raises:
-        InputError: as `read_mesh`; a size that no hand holds, or far too many triangles; both or neither of mass and
-            density, or one that is not positive; a density for a surface that encloses no volume.
+        InputError: as `read_object_mesh`; both or neither of mass and density, or one that is not positive; a density
+            for a surface that encloses no volume.
     """
     if (mass is None) == (density is None):
         raise InputError(f"{path}: mass is {mass} and density {density}; give one of them, in kg or kg/m³")
     if not (mass or density or 0) > 0:
         raise InputError(f"{path}: mass is {mass} and density {density}; the one given must be positive")
-    vertices, faces = read_mesh(path)
+    vertices, faces = read_object_mesh(path)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
-    longest = float((high - low).max())
-    if not _EXTENT[0] <= longest <= _EXTENT[1]:
-        guess = longest / 1000
-        hint = " (in millimetres? scale it by 0.001)" if _EXTENT[0] <= guess <= _EXTENT[1] else ""
-        raise InputError(
-            f"{path}: {longest:.4g} m long, but an object in a hand is {_EXTENT[0]:g} to {_EXTENT[1]:g} m{hint}"
-        )
-    if len(faces) > _MOST_FACES:
-        raise InputError(
-            f"{path}: {len(faces):,} triangles; at most {_MOST_FACES:,} are taken: simplify the mesh first "
-            "(trimesh's simplify_quadric_decimation, MeshLab, Blender's Decimate)"
-        )
     if density is not None:
         surface = trimesh.Trimesh(vertices, faces)
         if not surface.is_watertight or surface.volume <= 0:

@@ -123,13 +123,15 @@ def test_git_lfs_pointers_are_told(tmp_path, capsys, suffix):
 
 def test_hot3d_is_named(recordings, capsys):
     folder = recordings / "hot3d_sample"
-    for kind in ("umetrack", "mano"):
-        text = info(capsys, folder / f"{kind}_hand_pose_trajectory.jsonl", status=2)
-        assert "HOT3D" in text
-        assert "timestamp_ns" in text
-        assert "15 objects" in text
+    text = info(capsys, folder / "mano_hand_pose_trajectory.jsonl", status=2)
+    assert "HOT3D's hand poses, which are read from its folder" in text
+    assert "timestamp_ns" in text
+    assert "15 objects" in text
     assert "hand_model" in info(capsys, folder / "umetrack_hand_user_profile.json", status=2)
-    assert "instance.json, mano_hand_pose_trajectory.jsonl" in info(capsys, folder, status=2)
+    for path in (folder, folder / "umetrack_hand_pose_trajectory.jsonl"):
+        text = info(capsys, path)
+        assert "object mouse" in text
+        assert f"next: mjx-hand scene {path} --out scene.npz" in text
 
 
 def test_the_command_line_names_its_options(tmp_path, capsys):

@@ -27,7 +27,11 @@ def test_only_programs_of_the_project_are_changed(words, ours):
     assert is_program(words) == ours
 
 
-STARTING = "import sys; sys.orig_argv = ['python', '-m', 'train.ppo']; import mjx_hand; {}; print('in', flush=True); {}"
+# A shell's job in the background, which these tests may be, is started with Ctrl-C ignored.
+STARTING = (
+    "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    "sys.orig_argv = ['python', '-m', 'train.ppo']; import mjx_hand; {}; print('in', flush=True); {}"
+)
 DROPPED = "import gc, time; gc.callbacks.append(lambda phase, _: time.sleep(phase == 'start'))"
 
 

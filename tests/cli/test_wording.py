@@ -2,7 +2,7 @@
 
 import pytest
 
-from mjx_hand.cli.wording import as_options
+from mjx_hand.cli.terminal.wording import as_options
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,16 @@ from mjx_hand.view.video import video as view_video
 from mjx_hand.view.video.renderer import RendererUnavailable
 from train import evaluate
 from train.evaluate import evaluate_and_write
-from train.experiment.evaluate_seeds import POLICY, REPLAY, ZERO, Results, evaluate_seeds, shared_folder
+from train.experiment.evaluate_seeds import (
+    BASELINES,
+    POLICY,
+    PRESS,
+    REPLAY,
+    ZERO,
+    Results,
+    evaluate_seeds,
+    shared_folder,
+)
 from train.experiment.setup import chosen_checkpoint, settled
 from train.learning.checkpoint import load_checkpoint
 from train.learning.curve import Point
@@ -62,22 +71,22 @@ def written(results: dict[int, Results], configs: list[Config]) -> Path:
     return folder
 
 
-def test_the_tables_have_the_policy_and_both_baselines(results: dict[int, Results], tiny: Config):
+def test_the_tables_have_the_policy_and_the_baselines(results: dict[int, Results], tiny: Config):
     scores, failures = tables({SEEDS[0]: results[SEEDS[0]]}, tiny)
-    assert list(scores.columns) == ["", POLICY, ZERO, REPLAY, "paper"]
-    assert list(failures.columns) == ["", POLICY, ZERO, REPLAY]
+    assert list(scores.columns) == ["", POLICY, *BASELINES, "paper"]
+    assert list(failures.columns) == ["", POLICY, *BASELINES]
     assert [row[0] for row in failures.rows] == list(FAILURES)
     assert "1 held-out demonstrations" in scores.note
-    shown = {row[0]: row[1:4] for row in scores.rows}
+    shown = {row[0]: row[1:5] for row in scores.rows}
     evaluations = results[SEEDS[0]].evaluations
-    means = [f"{evaluations[title].rows()['tracking_error_cm']:.2f} cm" for title in (POLICY, ZERO, REPLAY)]
+    means = [f"{evaluations[title].rows()['tracking_error_cm']:.2f} cm" for title in (POLICY, *BASELINES)]
     assert list(shown["tracking error, mean over all rollouts"]) == means
     assert any(title.startswith("still held") for title in shown), "rollouts go on after the demonstration"
 
 
 def test_of_several_seeds_the_table_has_the_mean_and_the_range(results: dict[int, Results], tiny: Config):
     scores, _ = tables(results, tiny)
-    assert list(scores.columns) == ["", "policy, mean of 2 seeds", "least to greatest", ZERO, REPLAY, "paper"]
+    assert list(scores.columns) == ["", "policy, mean of 2 seeds", "least to greatest", *BASELINES, "paper"]
     errors = [results[seed].evaluations[POLICY].rows()["tracking_error_cm"] for seed in SEEDS]
     (shown,) = [row for row in scores.rows if row[0].startswith("tracking error")]
     assert shown[1] == f"{np.mean(errors):.2f} cm"
@@ -88,11 +97,12 @@ def test_of_several_seeds_the_table_has_the_mean_and_the_range(results: dict[int
 def test_each_seed_has_its_own_policy_and_all_share_the_baselines(results: dict[int, Results]):
     first, second = (results[seed] for seed in SEEDS)
     assert (first.checkpoint.steps, second.checkpoint.steps) != (0, 0)
-    for title in (ZERO, REPLAY):
+    for title in BASELINES:
         assert first.rollouts[title] is second.rollouts[title]
-    pressed, alone = (np.asarray(first.rollouts[title].qpos) for title in (ZERO, REPLAY))
+    hard, pressed, alone = (np.asarray(first.rollouts[title].qpos) for title in (PRESS, ZERO, REPLAY))
     np.testing.assert_array_equal(pressed[:, 0], alone[:, 0])
     assert not np.array_equal(pressed, alone)
+    assert not np.array_equal(pressed, hard)
     assert not np.array_equal(pressed, np.asarray(first.rollouts[POLICY].qpos))
 
 
@@ -105,8 +115,10 @@ def test_the_files_agree_with_each_other_and_with_the_rollouts(
     assert summary["checkpoint_steps"] == {
         str(config.seed): load_checkpoint(Path(config.out) / "best.npz").steps for config in configs
     }
+    assert summary["constant_press"] == dict(results[SEEDS[0]].press)
+    assert summary["constant_press"]["pinch"].endswith(" N")
     table = rows(written / "evaluation.csv")
-    kinds = [(POLICY, "4"), (POLICY, "7"), (ZERO, ""), (REPLAY, "")]
+    kinds = [(POLICY, "4"), (POLICY, "7"), *((title, "") for title in BASELINES)]
     assert [(row["column"], row["seed"], row["demonstration"]) for row in table] == [(*kind, "0") for kind in kinds]
     for (title, seed), row in zip(kinds, table, strict=True):
         scores: Mapping[str, float] = summary["seeds"][seed] if seed else summary["scores"][title]

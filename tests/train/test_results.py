@@ -38,6 +38,7 @@ def summary(grasp: str, success: Sequence[float], zero: float = 0.25, failed: Se
         "demonstrations": 32,
         "scores": {
             "policy": scores(sum(success) / len(success)),
+            "constant press": scores(0.75),
             "zero residual": scores(zero),
             "demonstration alone": scores(0.0),
         },
@@ -65,6 +66,7 @@ def test_a_row_an_experiment_with_the_papers_beside():
     assert (shown["success"], shown["least seed"]) == ("90.0 %", "80.0 %")
     assert (shown["paper's success"], shown["paper's tracking error"]) == ("80.2 %", "0.75 cm")
     assert (shown["zero residual"], shown["demonstration alone"]) == ("50.0 %", "0.0 %")
+    assert [shown[f"constant press{what}"] for what in ("", ", held 5 s", ", CHORD")] == ["75.0 %", "90.0 %", "80.0 %"]
     assert (shown["held 5 s"], shown["CHORD"], shown["rotation error"]) == ("90.0 %", "80.0 %", "5.0°")
     assert (shown["minutes to 95 %"], shown["minutes of training"]) == ("1.5", "1.5")
 

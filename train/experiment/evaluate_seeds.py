@@ -1,7 +1,8 @@
-"""The policies of several seeds on held-out demonstrations, beside two baselines that do not learn.
+"""The policies of several seeds on held-out demonstrations, beside three baselines that do not learn.
 
-The baselines are the same reference with a residual of zero, and the demonstration replayed as it is. They do not
-depend on the seed and are rolled out once; so is everything compiled.
+The baselines are one constant press for each grasp type, the best on training demonstrations
+(`envs.evaluation.constant_press`); the same reference with a residual of zero; and the demonstration replayed as it is.
+They do not depend on the seed and are rolled out once; so is everything compiled.
 """
 
 import dataclasses
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from envs.evaluation.constant_press import constant_press, search_press
 from envs.evaluation.evaluate import Evaluation, evaluate
 from envs.evaluation.roll_out import make_roll_out, zero_residual
 from envs.evaluation.rollout import Rollouts
@@ -25,17 +27,26 @@ from train.settings.config import Config
 from train.settings.saved import differing, policy_settings
 
 HOLD = 5.0  # s after the demonstration, for the hold metric
-POLICY, ZERO, REPLAY = "policy", "zero residual", "demonstration alone"
+POLICY, PRESS, ZERO, REPLAY = "policy", "constant press", "zero residual", "demonstration alone"
+BASELINES = (PRESS, ZERO, REPLAY)
 
 
 @dataclasses.dataclass(frozen=True)
 class Results:
-    """Rollouts and their scores, by column title, of one seed's policy and the baselines."""
+    """Rollouts and their scores, by column title, of one seed's policy and the baselines.
+
+    Attributes:
+        env: what they were rolled out in.
+        checkpoint: the policy.
+        rollouts, evaluations: by column title.
+        press: how hard the constant press is, in words, by grasp type.
+    """
 
     env: TrackingEnv
     checkpoint: Checkpoint
     rollouts: Mapping[str, Rollouts]
     evaluations: Mapping[str, Evaluation]
+    press: Mapping[str, str]
 
 
 def evaluate_seeds(configs: Sequence[Config], part: str = "heldout") -> dict[int, Results]:
@@ -58,26 +69,29 @@ def evaluate_seeds(configs: Sequence[Config], part: str = "heldout") -> dict[int
     env = load_env(configs[0], part)
     checkpoints = {config.seed: chosen_checkpoint(config, env.observation_size) for config in configs}
     objects = [demonstration.object for demonstration in env.demonstrations]
-    alone = without_grip(env)
     policy = deterministic_policy(configs[0].ppo, env.observation_size, env.action_size)
     rollouts: dict[int | str, Rollouts] = {}
-    with counter(len(configs) + 2, "evaluating (sets of rollouts)") as advance:
+    with counter(len(configs) + len(BASELINES) + 1, "evaluating (sets of rollouts)") as advance:
+        strengths = search_press(env if part == "train" else load_env(configs[0], "train"), HOLD)
+        advance(1)
         roll_out = make_roll_out(env, policy, HOLD)
         for seed, checkpoint in checkpoints.items():
             rollouts[seed] = roll_out(checkpoint.policy)
             advance(1)
-        rollouts[ZERO] = make_roll_out(env, zero_residual, HOLD)(None)
-        advance(1)
-        rollouts[REPLAY] = make_roll_out(alone, zero_residual, HOLD)(None)
-        advance(1)
+        press, roll_out = constant_press(env), make_roll_out(env, zero_residual, HOLD)
+        given = {PRESS: press.tables(strengths), ZERO: env.tables, REPLAY: without_grip(env)}
+        for title in BASELINES:
+            rollouts[title] = roll_out(None, given[title])
+            advance(1)
     scores = {key: evaluate(each, objects) for key, each in rollouts.items()}
-    keys = {seed: {POLICY: seed, ZERO: ZERO, REPLAY: REPLAY} for seed in checkpoints}
+    keys = {seed: {POLICY: seed, **{title: title for title in BASELINES}} for seed in checkpoints}
     return {
         seed: Results(
             env,
             checkpoint,
             {title: rollouts[key] for title, key in keys[seed].items()},
             {title: scores[key] for title, key in keys[seed].items()},
+            press.described(strengths),
         )
         for seed, checkpoint in checkpoints.items()
     }

@@ -4,13 +4,15 @@ import dataclasses
 from collections.abc import Collection
 from pathlib import Path
 
+import jax.numpy as jnp
+
 from envs.demonstrations.load_env import env_of_set
 from envs.demonstrations.load_set import is_divided
 from envs.evaluation.evaluate import Evaluation, evaluate
 from envs.evaluation.roll_out import make_roll_out
 from envs.evaluation.rollout import Rollouts
 from envs.scene import NUM_WRIST
-from envs.tracking import TrackingEnv
+from envs.tracking import Tables, TrackingEnv
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
 from train.learning.checkpoint import Checkpoint, load_checkpoint
@@ -31,10 +33,13 @@ def load_env(config: Config, part: str) -> TrackingEnv:
     return env_of_set(config.data, part, config.engine, config.task, config.demonstrations)
 
 
-def without_grip(env: TrackingEnv) -> TrackingEnv:
-    """The same with demonstrations replayed as they are, without the forces that the reference adds."""
-    task = dataclasses.replace(env.task, grip_force=0.0)
-    return TrackingEnv(env.demonstrations, env.hands, env.engine.name, task)
+def without_grip(env: TrackingEnv) -> Tables:
+    """Its tables with demonstrations replayed as they are, without the forces that the reference adds."""
+    reference = env.reference
+    bare = dataclasses.replace(
+        reference, controls=reference.controls - reference.grip, grip=jnp.zeros_like(reference.grip)
+    )
+    return dataclasses.replace(env.tables, reference=bare)
 
 
 def chosen_path(config: Config) -> Path:

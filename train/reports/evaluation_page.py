@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from envs.evaluation.metrics import position_error
 from mjx_hand.view.figures import plots
 from mjx_hand.view.report import Film, Headline, Plot, Report, Section, Table
-from train.experiment.evaluate_seeds import POLICY, REPLAY, ZERO, Results, median_and_worst
+from train.experiment.evaluate_seeds import BASELINES, POLICY, PRESS, REPLAY, ZERO, Results, median_and_worst
 from train.reports.machine import processor, versions
 from train.reports.published import PAPER
 from train.reports.score_table import demonstration_table, failed_table, failure_table, score_table
@@ -30,13 +30,18 @@ def tables(results: Mapping[int, Results], config: Config) -> tuple[Table, ...]:
     count = len(first.env.demonstrations)
     note = (
         f"{count} held-out demonstrations, every rollout counted, from frame 0, unassisted; "
-        "the paper does not define its success"
+        f"the paper does not define its success. Constant press: {pressed(first)}"
     )
     columns = {POLICY: [result.evaluations[POLICY] for result in results.values()]}
-    columns |= {title: [first.evaluations[title]] for title in (ZERO, REPLAY)}
+    columns |= {title: [first.evaluations[title]] for title in BASELINES}
     grasps = _grasps(first)
     by_type = [type_table(columns, grasps)] if len(set(grasps)) > 1 else []
     return score_table(columns, PAPER.get(config.data.grasp), note), failure_table(columns), *by_type
+
+
+def pressed(results: Results) -> str:
+    """The constants of the constant press, one for each grasp type."""
+    return ", ".join(f"{grasp} {constant}" for grasp, constant in results.press.items())
 
 
 def tracking_plot(results: Mapping[int, Results]) -> Figure:
@@ -45,7 +50,7 @@ def tracking_plot(results: Mapping[int, Results]) -> Figure:
     every = [result.rollouts[POLICY] for result in results.values()]
     together = np.concatenate([100 * position_error(r) for r in every])
     errors = {POLICY: (together, np.concatenate([r.counted for r in every]))}
-    errors |= {t: (100 * position_error(first.rollouts[t]), first.rollouts[t].counted) for t in (ZERO, REPLAY)}
+    errors |= {t: (100 * position_error(first.rollouts[t]), first.rollouts[t].counted) for t in BASELINES}
     return plots.error_over_time(first.env.fps, errors, limit=3.0)
 
 
@@ -70,7 +75,7 @@ def evaluation_page(results: Mapping[int, Results], configs: Sequence[Config], s
     """Everything about an evaluation of one or several seeds."""
     config, first = configs[0], next(iter(results.values()))
     policies = {seed: result.evaluations[POLICY] for seed, result in results.items()}
-    baselines = {title: first.evaluations[title] for title in (ZERO, REPLAY)}
+    baselines = {title: first.evaluations[title] for title in BASELINES}
     scores, failures, *by_type = tables(results, config)
     objects = [demonstration.object for demonstration in first.env.demonstrations]
     success = [100 * e.rows()["manip_trans_object"] for e in policies.values()]
@@ -89,8 +94,9 @@ def evaluation_page(results: Mapping[int, Results], configs: Sequence[Config], s
             Headline("success", f"{np.mean(success):.1f} %", _between(success, "%", 1)),
             Headline("tracking error", f"{np.mean(errors):.2f} cm", _between(errors, "cm", 2)),
             Headline(
-                "zero residual",
-                f"{100 * baselines[ZERO].rows()['manip_trans_object']:.1f} %",
+                "constant press",
+                f"{100 * baselines[PRESS].rows()['manip_trans_object']:.1f} %",
+                f"zero residual {100 * baselines[ZERO].rows()['manip_trans_object']:.1f} %, "
                 f"demonstration alone {100 * baselines[REPLAY].rows()['manip_trans_object']:.1f} %",
             ),
             *(

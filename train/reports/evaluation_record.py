@@ -48,6 +48,7 @@ def write_results(results: Mapping[int, Results], configs: Sequence[Config], fil
             POLICY: {grasp: _mean([scores[grasp] for scores in by_type]) for grasp in by_type[0]},
             **{title: type_scores(e, grasps) for title, e in baselines.items()},
         },
+        "constant_press": dict(first.press),
         "seeds": {seed: e.rows() for seed, e in policies.items()},
         "failures": {
             POLICY: _mean([e.failure_shares() for e in policies.values()]),

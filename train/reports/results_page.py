@@ -60,7 +60,11 @@ def _page(experiments: Sequence[Experiment], waiting: Sequence[str], command: st
             Headline("success", last["success"], _beside(last["paper's success"])),
             Headline("tracking error", last["tracking error"], _beside(last["paper's tracking error"])),
             *([Headline("held 5 s longer", last["held 5 s"])] if last["held 5 s"] else []),
-            Headline("without learning", last["zero residual"], f"demonstration alone {last['demonstration alone']}"),
+            Headline(
+                "constant press, nothing learned",
+                last["constant press"],
+                f"zero residual {last['zero residual']}, demonstration alone {last['demonstration alone']}",
+            ),
         ),
         sections=(
             Section("Held-out demonstrations", [table]),

@@ -5,8 +5,8 @@ looks the same from all sides. Five facts mend it: gravity, an object that stand
 not slip, fingers that touch without sinking in, and an object that did not fall. Its way stays the recording's.
 """
 
-import dataclasses
 from collections.abc import Callable
+from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
@@ -18,10 +18,10 @@ from envs.demonstrations.from_recording.grasp_trajectory import Act, grasp_traje
 from envs.demonstrations.from_recording.observed import in_world, reconstruct, resampled, start_time
 from envs.demonstrations.from_recording.support_plane import estimate_support_plane, world_from_recording
 from envs.demonstrations.from_recording.variations import RecordingSettings
-from mjx_hand.capture.datasets.dexmv_object import RecordedObject, load_object, recording_files
 from mjx_hand.capture.keypoints.bone_lengths import lengths, shape_of_lengths
 from mjx_hand.capture.keypoints.layouts import hand_keypoints
-from mjx_hand.capture.load import load_motion
+from mjx_hand.capture.load_scene import load_scene
+from mjx_hand.capture.object_poses.dexmv_object import recording_files
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
 from mjx_hand.hand.model import HandModel
@@ -29,6 +29,7 @@ from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.motion.joint_motion import JointMotion
 from mjx_hand.motion.motion import Motion
 from mjx_hand.motion.resample import matrix_quaternions
+from mjx_hand.motion.scene import RecordedObject
 from mjx_hand.objects.convex_decomposition import convex_pieces
 from mjx_hand.objects.description import ObjectDescription
 from mjx_hand.retarget.refine import recorded_places, refine_angles
@@ -50,12 +51,7 @@ def read_demonstration(
             the recorded one holds it.
     """
     report("reading the recording", 0.0)
-    recording, mesh = recording_files(settings.path)
-    motion, recorded = load_motion(recording), load_object(recording, mesh)
-    frames = min(motion.num_frames, len(recorded.position))
-    if not motion.valid[:frames].all():
-        raise InputError(f"{recording}: {int((~motion.valid[:frames]).sum())} frames have no hand; leave those out")
-    recorded = dataclasses.replace(recorded, rotation=recorded.rotation[:frames], position=recorded.position[:frames])
+    motion, recorded = _one_of_each(recording_files(settings.path)[0])
     table = estimate_support_plane(recorded)
     model = load_hand(side=motion.side)
     shape, angles = _angles(motion, model)
@@ -72,7 +68,7 @@ def read_demonstration(
     act = Act(observed=observed, lifted=table.lifted / motion.fps, held=held, hand=hand, object=description)
     candidates = solve_grasp_poses(held, hand, act.planes)
     trajectory = grasp_trajectory(act, search_grasp(act, candidates, settings.force, report)[None])
-    source = f"{motion.source} with {mesh.name}"
+    source = f"{motion.source} with {recorded.name}"
     return Demonstration(
         motion=JointMotion(
             fps=settings.rate,
@@ -91,6 +87,26 @@ def read_demonstration(
         grasp=RECORDED,
         source=source,
     )
+
+
+def _one_of_each(recording: Path) -> tuple[Motion, RecordedObject]:
+    """The hand and the object of a scene, both seen in every frame.
+
+    Raises:
+        InputError: there are others, or none, or they are not seen all the time.
+    """
+    scene = load_scene(recording)
+    if len(scene.hands) != 1 or len(scene.objects) != 1:
+        raise InputError(
+            f"{recording}: shows {len(scene.hands)} hands, {len(scene.objects)} objects; give a recording of one"
+        )
+    motion, recorded = scene.hands[0], scene.objects[0]
+    for seen, what in ((motion.valid, "hand"), (recorded.seen, recorded.name)):
+        if not seen.all():
+            raise InputError(f"{recording}: {int((~seen).sum())} frames have no {what}; leave those out")
+    if recorded.kind != "mesh":
+        raise InputError(f"{recording}: the object's mesh is not there; put its .stl beside the recording")
+    return motion, recorded
 
 
 def _angles(motion: Motion, model: HandModel) -> tuple[Float[np.ndarray, "s"], Float[np.ndarray, "t 20"]]:

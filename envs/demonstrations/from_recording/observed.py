@@ -8,10 +8,10 @@ from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.from_recording.grasp_pose import GraspPose
 from envs.demonstrations.from_recording.support_plane import SupportPlane
-from mjx_hand.capture.datasets.dexmv_object import RecordedObject
 from mjx_hand.motion.gaps import fill_turns
 from mjx_hand.motion.motion import Motion
 from mjx_hand.motion.resample import interpolation_index, matrix_quaternions, quaternion_matrices, slerp
+from mjx_hand.motion.scene import RecordedObject
 from mjx_hand.motion.smooth import smooth_rows
 from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics
 

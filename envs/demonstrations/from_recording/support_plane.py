@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import least_squares
 
-from mjx_hand.capture.datasets.dexmv_object import RecordedObject
 from mjx_hand.errors import InputError
+from mjx_hand.motion.scene import RecordedObject
 
 _AWAY = 0.03  # m from where it stood: lifted
 _BEFORE = 8  # frames before that are not counted as standing

@@ -10,7 +10,8 @@ from jaxtyping import Array, Float
 from scipy.optimize import nnls
 
 from envs.grasps import GraspType, Pads, Wrap
-from mjx_hand.hand.joints import FINGERS, LINKS, NUM_HINGES
+from envs.grasps.grasp_type import wrap_torque
+from mjx_hand.hand.joints import LINKS, NUM_HINGES
 from mjx_hand.objects.description import ObjectDescription
 from mjx_hand.objects.primitives import face_along, half_extents, hull_planes, signed_distance
 from mjx_hand.pytree import pytree
@@ -70,9 +71,7 @@ def squeeze_angles(closing: Pads | Wrap, posture: Posture, gains: Gains) -> Floa
     harder squeeze makes a pinch worse.
     """
     if isinstance(closing, Wrap):
-        torque = np.concatenate(
-            [[0.0, *(closing.thumb_torque if f == "thumb" else closing.finger_torque)] for f in FINGERS]
-        )
+        torque = wrap_torque(closing)
     else:
         inward = -np.asarray(posture.contact_normal)
         points, jacobian = np.asarray(posture.contact_point), np.asarray(posture.contact_jacobian)

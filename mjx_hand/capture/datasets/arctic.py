@@ -13,20 +13,32 @@ The dataset's tools make the hand with `flat_hand_mean=False` (common/body_model
 pose, so the licensed file is needed. `trans` is added to a hand that was turned about its wrist joint: the wrist is at
 `trans` plus the joint's place at rest.
 
-The object (`SEQUENCE.object.npy`) and the body are not read.
+The object: `SEQUENCE.object.npy` (T, 7) beside the raw hands, angle (rad), axis-angle, translation (mm); in processed
+files `obj_arti`, `obj_rot` and `obj_trans`. It is called as its sequence begins (box_grab_01). Its meshes are `top.obj`
+and `bottom.obj` (mm) in `meta/object_vtemplates/NAME`, beside `raw_seqs`: the top turns by the angle about the axis
+(0, 0, -1) through their common origin, before both are moved (common/object_tensors.py). The body is not read.
 """
 
+from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
-from mjx_hand.capture.datasets.mano_motion import chosen_side, mano_motion, recorded, turns
+from mjx_hand.capture.datasets.dataset_root import beside
+from mjx_hand.capture.datasets.mano_motion import chosen_side, hands_of, mano_motion, recorded, turns
 from mjx_hand.capture.datasets.subject import full_pose, one_shape, subject_of
+from mjx_hand.capture.object_poses.with_mesh import object_with_mesh
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import numbers
-from mjx_hand.files.contents import plain, unwrapped
-from mjx_hand.motion import Motion
+from mjx_hand.files.contents import WHOLE, plain, read_contents, unwrapped
+from mjx_hand.motion import Motion, RecordedObject, RecordedScene, make_scene
+from mjx_hand.motion.scene import Hinge
+from mjx_hand.pytree import replace
 
 FPS = 30.0
+_OBJECT: dict[str, tuple[int | str, ...]] = {"obj_arti": ("t",), "obj_rot": ("t", 3), "obj_trans": ("t", 3)}
+_AXIS = np.array([0.0, 0.0, -1.0])
 _FIELDS = ("rot", "pose", "trans", "shape")
 _SHOWN = 6  # how many names of sequences a message lists
 
@@ -69,6 +81,10 @@ def _chosen(path: Path, contents: Contents, request: Request) -> tuple[str, Cont
 
 def _read(path: Path, contents: Contents, request: Request) -> Motion:
     sequence, contents = _chosen(path, contents, request)
+    return _hand(sequence, path, contents, request)
+
+
+def _hand(sequence: str, path: Path, contents: Contents, request: Request) -> Motion:
     hands = _hands(contents)
     side = chosen_side(path, list(hands), request)
     found = {name: plain(path, f"{side} {name}", hands[side][name]) for name in _FIELDS if name in hands[side]}
@@ -91,9 +107,49 @@ def _read(path: Path, contents: Contents, request: Request) -> Motion:
     )
 
 
+def _object(path: Path, contents: Contents, sequence: str) -> tuple[RecordedObject, ...]:
+    """The two parts of the object: the bottom, and the top that turns about it."""
+    file = path.with_name(path.name.removesuffix(".mano.npy") + ".object.npy")
+    params = unwrapped(contents.get("params"))
+    if isinstance(params, dict) and "obj_rot" in params:
+        given = {name: plain(path, name, params[name]) for name in _OBJECT if name in params}
+        n = numbers(path, given, _OBJECT, finite=False)
+        rows = np.column_stack([n[name] for name in _OBJECT]).astype(float)
+    elif path.name.endswith(".mano.npy") and file.is_file():
+        whole = {"object": plain(file, "object", read_contents(file).get(WHOLE))}
+        rows = numbers(file, whole, {"object": ("t", 7)}, finite=False)["object"].astype(float)
+    else:
+        return ()
+    rows[:, 4:] /= 1e3
+    seen = recorded(path, rows)
+    angle, turn = np.where(seen, rows[:, 0], 0.0), turns(rows[:, 1:4], seen)
+    poses = np.tile(np.eye(4), (2, len(rows), 1, 1))
+    poses[0, :, :3, :3] = turn
+    poses[1, :, :3, :3] = turn @ turns(angle[:, None] * _AXIS, seen)
+    poses[:, :, :3, 3] = np.where(seen[:, None], rows[:, 4:], 0.0)
+    name = sequence.rpartition("/")[2].partition("_")[0]
+    bottom, top = (
+        object_with_mesh(f"{name} {part}", own, _mesh(path, name, part), unit="mm", seen=seen)
+        for part, own in zip(("bottom", "top"), poses, strict=True)
+    )
+    return bottom, replace(top, hinge=Hinge(point=np.zeros(3), axis=_AXIS, angle=angle, parent=bottom.name))
+
+
+def _mesh(path: Path, name: str, part: str) -> Path | None:
+    sound = name.isidentifier()  # part of a path
+    return beside(path, 3, f"meta/object_vtemplates/{name}/{part}.obj") if sound else None
+
+
+def _read_scene(path: Path, contents: Contents, request: Request) -> RecordedScene:
+    sequence, chosen = _chosen(path, contents, request)
+    hands = hands_of(partial(_hand, sequence), path, chosen, request, list(_hands(chosen)))
+    return make_scene(hands, _object(path, chosen, sequence), source=f"ARCTIC {sequence}")
+
+
 FORMAT = DatasetFormat(
     name="ARCTIC (.npy with right and left: rot, pose, trans, shape)",
     recognises=_recognises,
     read=_read,
     has_sequences=True,
+    read_scene=_read_scene,
 )

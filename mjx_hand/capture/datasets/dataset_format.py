@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from mjx_hand.motion import Motion
+from mjx_hand.motion import Motion, RecordedScene
 from mjx_hand.plugins import plugins
 
 Contents = Mapping[str, Any]
@@ -19,7 +19,7 @@ class Request:
         side: "right" or "left", where both hands are recorded.
         sequence: the name of one recording, where a file or folder has several.
         mano: a licensed MANO file of that side, where poses are PCA coefficients or relative to MANO's mean pose, and
-            for the wrist joint's own place.
+            for the wrist joint's own place; for a scene of both hands the folder of both files.
         fps: frames per second, where the recording does not say.
     """
 
@@ -39,12 +39,15 @@ class DatasetFormat:
             `.npz`, or of the dictionary in a `.npy` or pickle, read without running it; else empty.
         read: the motion in it, as the request says; raises InputError where the file is of the format but not sound.
         has_sequences: whether `Request.sequence` chooses among several.
+        read_scene: both hands, or the one that the request names, with the objects; None where a recording of this
+            format has one hand and no object.
     """
 
     name: str
     recognises: Callable[[Path, Contents], bool]
     read: Callable[[Path, Contents, Request], Motion]
     has_sequences: bool = False
+    read_scene: Callable[[Path, Contents, Request], RecordedScene] | None = None
 
 
 def dataset_formats() -> list[DatasetFormat]:

@@ -9,7 +9,8 @@ Metres and radians, in the camera's frame (about x right, y down, z forward), on
 - `joints` (T, 21, 3), where present: joints and finger tips in the order that `joint_order` names.
 
 The transforms carry the subject's own joint centres, so no licensed MANO file is needed. Shape and bone lengths were
-estimated frame by frame and jitter; one hand has one of each, so they are medians over the frames.
+estimated frame by frame and jitter; one hand has one of each, so they are medians over the frames. The object, where
+the recording has one, is `dexmv_object`'s.
 """
 
 from pathlib import Path
@@ -20,11 +21,12 @@ from scipy.spatial.transform import Rotation
 
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
 from mjx_hand.capture.datasets.joint_places import offsets_in_parents
-from mjx_hand.capture.datasets.mano_motion import refuse_wild
+from mjx_hand.capture.datasets.mano_motion import hands_of, refuse_wild
+from mjx_hand.capture.object_poses.dexmv_object import dexmv_objects
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import numbers
 from mjx_hand.hand.joints import FINGERS, LINKS, PARENTS, TIP_LINKS
-from mjx_hand.motion import Motion, check_motion
+from mjx_hand.motion import Motion, RecordedScene, check_motion, make_scene
 from mjx_hand.motion.resample import matrix_quaternions
 
 FPS = 25.0  # of every published sequence; the files do not say
@@ -115,8 +117,14 @@ def _read(path: Path, arrays: Contents, request: Request) -> Motion:
     )
 
 
+def _read_scene(path: Path, arrays: Contents, request: Request) -> RecordedScene:
+    (hand,) = hands_of(_read, path, arrays, request, ["right"])
+    return make_scene(hand, dexmv_objects(path, arrays, hand.num_frames))
+
+
 FORMAT = DatasetFormat(
     name=f"DexMV (.npz with {', '.join(_NEEDED)})",
     recognises=_recognises,
     read=_read,
+    read_scene=_read_scene,
 )

@@ -10,7 +10,11 @@ pickled dictionaries `rhand` and `lhand`, each with:
 The tools make the hand with `flat_hand_mean=True`: nothing is to be added. Where `fullpose` is not there, the
 coefficients need the licensed file. `transl` is added to a hand that was turned about its wrist joint; the licensed
 file finds that joint, and the others, in the subject's mesh, or in the mean hand's where the mesh is not there. Poses
-are in the capture system's frame. Body, object, table and contacts are not read.
+are in the capture system's frame, z up.
+
+`object`: `params` with `global_orient` and `transl` (T, 3), and `object_mesh`, the path of its mesh (m) below the root;
+`obj_name`. The tools multiply the mesh's vertices, as rows, by the rotation's matrix (tools/objectmodel.py): the object
+is turned by its inverse. Body, table and contacts are not read.
 """
 
 from pathlib import Path, PurePosixPath
@@ -21,13 +25,14 @@ import trimesh
 
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
 from mjx_hand.capture.datasets.dataset_root import beside
-from mjx_hand.capture.datasets.mano_motion import chosen_side, mano_motion, recorded, turns
+from mjx_hand.capture.datasets.mano_motion import chosen_side, hands_of, mano_motion, recorded, turns
 from mjx_hand.capture.datasets.subject import full_pose, subject_of
+from mjx_hand.capture.object_poses.with_mesh import object_with_mesh
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import numbers
 from mjx_hand.files.contents import plain, unwrapped
 from mjx_hand.hand.mano_file import MANO_VERTICES
-from mjx_hand.motion import Motion
+from mjx_hand.motion import Motion, RecordedObject, RecordedScene, make_scene
 
 _KEYS = {"right": "rhand", "left": "lhand"}
 
@@ -93,4 +98,29 @@ def _read(path: Path, contents: Contents, request: Request) -> Motion:
     )
 
 
-FORMAT = DatasetFormat(name="GRAB (.npz with framerate and rhand, lhand)", recognises=_recognises, read=_read)
+def _object(path: Path, contents: Contents) -> tuple[RecordedObject, ...]:
+    told = unwrapped(contents.get("object"))
+    if not isinstance(told, dict) or not isinstance(told.get("params"), dict):
+        return ()
+    found = {name: plain(path, f"object {name}", value) for name, value in told["params"].items()}
+    n = numbers(path, found, {"global_orient": ("t", 3), "transl": ("t", 3)}, finite=False)
+    seen = recorded(path, *n.values())
+    poses = np.tile(np.eye(4), (len(seen), 1, 1))
+    poses[:, :3, :3] = np.swapaxes(turns(n["global_orient"], seen), 1, 2)
+    poses[:, :3, 3] = np.where(seen[:, None], n["transl"], 0.0)
+    named = PurePosixPath(_text(told.get("object_mesh")))
+    sound = named.suffix.lower() == ".ply" and not named.is_absolute() and ".." not in named.parts
+    name = _text(plain(path, "obj_name", contents["obj_name"])) if "obj_name" in contents else ""
+    mesh = beside(path, 3, str(named)) if sound else None
+    return (object_with_mesh(name or named.stem or "object", poses, mesh, seen=seen),)
+
+
+def _read_scene(path: Path, contents: Contents, request: Request) -> RecordedScene:
+    hands = hands_of(_read, path, contents, request, list(_hands(contents)))
+    source = f"GRAB {path.absolute().parent.name}/{path.stem}"
+    return make_scene(hands, _object(path, contents), up="+z", source=source)
+
+
+FORMAT = DatasetFormat(
+    name="GRAB (.npz with framerate and rhand, lhand)", recognises=_recognises, read=_read, read_scene=_read_scene
+)

@@ -1,6 +1,7 @@
-"""What importers of MANO parameters share: choosing a hand, masking frames, and the motion that comes of it."""
+"""What importers share: choosing a hand or reading both, masking frames, and the motion of MANO parameters."""
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,13 +9,14 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.spatial.transform import Rotation
 
-from mjx_hand.capture.datasets.dataset_format import Request
+from mjx_hand.capture.datasets.dataset_format import Contents, Request
 from mjx_hand.capture.datasets.subject import Subject
 from mjx_hand.errors import InputError
 from mjx_hand.motion import Motion, check_motion
 from mjx_hand.motion.resample import matrix_quaternions
 
 Array = np.ndarray
+_FILES = (".pkl", ".npz")  # endings of licensed files
 LONGEST = 10**7  # frames: a day at 120 a second; frame numbers beyond it are damage
 FARTHEST = 1e4  # rad or m; no pose comes near
 
@@ -35,6 +37,36 @@ def chosen_side(path: Path, present: Sequence[Any], request: Request) -> str:
     if side not in present:
         raise InputError(f"{path}: holds no {side} hand; give side={present[0]!r}")
     return side
+
+
+def hands_of(
+    read: Callable[[Path, Contents, Request], Motion],
+    path: Path,
+    contents: Contents,
+    request: Request,
+    present: Sequence[str],
+) -> tuple[Motion, ...]:
+    """The hand that the request names, or all that are present.
+
+    Args:
+        read: reads one hand, which its request names.
+        path, contents: of the recording.
+        request: of a scene.
+        present: the sides that were recorded.
+
+    Raises:
+        InputError: none is there, the one asked for is not, or a hand cannot be read.
+    """
+    first = dataclasses.replace(request, side=request.side or next(iter(present), None))
+    one = chosen_side(path, present, first)
+    sides = [one] if request.side is not None else list(dict.fromkeys(present))
+    if len(sides) > 1 and request.mano is not None and not request.mano.is_dir():
+        raise InputError(
+            f"{path}: holds both hands, and {request.mano} is the file of one; give the folder of MANO_RIGHT.pkl and "
+            "MANO_LEFT.pkl, or choose a hand with side='right' or side='left'"
+        )
+    asked = [dataclasses.replace(request, side=side, mano=mano_file(request.mano, side)) for side in sides]
+    return tuple(read(path, contents, each) for each in asked)
 
 
 def frame_rate(path: Path, request: Request) -> float:
@@ -131,3 +163,14 @@ def mano_motion(
         ),
         name=str(path),
     )
+
+
+def mano_file(mano: Path | None, side: str) -> Path | None:
+    """The file of this side, where the folder of both is given."""
+    if mano is None or not mano.is_dir():
+        return mano
+    named = [mano / f"MANO_{side.upper()}{ending}" for ending in _FILES]
+    found = next((file for file in named if file.is_file()), None)
+    if found is None:
+        raise InputError(f"{mano}: has no {named[0].name}; put it there (https://mano.is.tue.mpg.de)")
+    return found

@@ -1,5 +1,7 @@
 """Recordings as scenes: what `mjx-hand view` shows of each kind of file."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial import KDTree
@@ -8,17 +10,20 @@ from mjx_hand.capture.keypoints.skeleton import BONES
 from mjx_hand.capture.markers.marker_recording import MarkerRecording
 from mjx_hand.errors import InputError
 from mjx_hand.hand.model import HandModel
-from mjx_hand.motion import Demonstration, JointMotion, Motion
+from mjx_hand.motion import Demonstration, JointMotion, Motion, RecordedScene
+from mjx_hand.motion.scene_notes import wrist_distance
 from mjx_hand.pytree import replace
 from mjx_hand.retarget.sequence import retarget_errors, retarget_sequence, rigid_hand_of
 from mjx_hand.rigid.build import build_rigid_hand
 from mjx_hand.rigid.own_hinges import with_hinges_of
 from mjx_hand.view.browser.hand_scene import object_layers, skin_layer, skin_vertices, skinned_motion, twin_layer
+from mjx_hand.view.browser.object_layer import object_layer, turned_layers
 from mjx_hand.view.browser.scene import Colour, Curve, Layer, PointLayer, Scene, SkinLayer
 
 MARKER: Colour = (46, 107, 186)
 KEYPOINT: Colour = (38, 130, 120)
 GLASS = 0.55
+_CURVES = 4  # of a scene: more are no figure
 NEAR = 0.03  # m from the skin, in the usual frame, up to which a marker is one of the hand's
 
 
@@ -30,6 +35,29 @@ def motion_scene(motion: Motion, hand: HandModel, up: str = "+z") -> Scene:
     curve = Curve("finger tips of the twin", np.where(motion.valid, 1e3 * tips, np.nan), "mm")
     layers = (skin_layer(motion, hand), twin_layer(angles, rigid, shown=False))
     return Scene(title=motion.source or "motion", fps=motion.fps, layers=layers, curves=(curve,), up=up)
+
+
+def recorded_scene(scene: RecordedScene, hands: Mapping[str, HandModel], up: str | None = None) -> Scene:
+    """Hands with the objects that they hold, and how far each wrist is from each object.
+
+    Args:
+        scene: what was recorded.
+        hands: the model of each side.
+        up: an axis; None takes the scene's own, turned to +z, or +z.
+    """
+    layers: list[Layer] = [skin_layer(motion, hands[motion.side], name=f"{motion.side} hand") for motion in scene.hands]
+    layers += [object_layer(found) for found in scene.objects]
+    if up is None and scene.up is not None:
+        layers = turned_layers(layers, scene.up)
+    curves = [
+        Curve(f"{motion.side} wrist from {found.name}", 1e3 * wrist_distance(motion, found), "mm")
+        for motion in scene.hands
+        for found in scene.objects
+        if (motion.valid & found.seen).any()
+    ]
+    nearest = sorted(curves, key=lambda curve: float(np.nanmin(curve.values)))[:_CURVES]
+    title = scene.source or "scene"
+    return Scene(title=title, fps=scene.fps, layers=tuple(layers), curves=tuple(nearest), up=up or "+z")
 
 
 def joint_motion_scene(motion: JointMotion, hand: HandModel, up: str = "+z") -> Scene:

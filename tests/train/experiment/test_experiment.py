@@ -12,12 +12,13 @@ from envs.demonstrations import load_set
 from envs.demonstrations.load_set import load_part
 from envs.demonstrations.set_settings import SetSettings, set_folder
 from envs.grasps import grasp_names, grasp_type
+from envs.reference import make_reference
 from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from mjx_hand.pytree import replace
 from mjx_hand.view.browser.viewer import Viewer
 from train.evaluate import evaluate_and_write
-from train.experiment.evaluate_seeds import POLICY, REPLAY, ZERO
+from train.experiment.evaluate_seeds import BASELINES, POLICY
 from train.experiment.setup import load_env, without_grip
 from train.play import viewer
 from train.reports.evaluation_record import evaluation_fingerprint
@@ -67,6 +68,8 @@ def test_the_types_stand_one_after_the_other(monkeypatch, tiny: Config, everythi
     for row, force in zip(grip, forces, strict=True):
         assert np.allclose(row, grip[0]) == (force == forces[0])
     assert not np.asarray(without_grip(env).reference.grip).any()
+    bare = make_reference(env.demonstrations, env.hands, grip_force=0.0, gains=env.gains)
+    np.testing.assert_allclose(without_grip(env).reference.controls, bare.controls, atol=1e-6)
 
 
 def test_one_set_is_never_of_all_types(everything: Config, tmp_path):
@@ -86,9 +89,9 @@ def test_all_types_are_made_trained_evaluated_and_played(everything: Config, tmp
     monkeypatch.setattr(video, "side_by_side", lambda env, rollouts, index, path: Path(path).write_bytes(b"film"))
     folder, (_, _, by_type) = evaluate_and_write([config])
     assert [row[0] for row in by_type.rows] == [*grasp_names(), "mean over the types"]
-    assert list(by_type.columns) == ["", POLICY, ZERO, REPLAY, "paper, its own count"]
+    assert list(by_type.columns) == ["", POLICY, *BASELINES, "paper, its own count"]
     summary = json.loads((folder / "evaluation.json").read_text())
-    for title in (POLICY, ZERO, REPLAY):
+    for title in (POLICY, *BASELINES):
         every = summary["types"][title]
         assert list(every) == grasp_names()
         mean = np.mean([scores["tracking_error_cm"] for scores in every.values()])

@@ -14,10 +14,13 @@ from envs.demonstrations.from_recording.support_plane import estimate_support_pl
 from envs.demonstrations.from_recording.variations import RecordingSettings, vary
 from envs.demonstrations.set_settings import SetSettings, set_folder
 from envs.demonstrations.twin_hands import twins
-from mjx_hand.capture.datasets.dexmv_object import RecordedObject, load_object, recording_files
+from mjx_hand.capture.load_scene import load_scene
+from mjx_hand.capture.object_poses.dexmv_object import recording_files
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.motion.joint_motion import JointMotion
+from mjx_hand.motion.make_scene import recorded_object
+from mjx_hand.motion.scene import RecordedObject
 from mjx_hand.objects.description import ObjectDescription
 from tests.envs.demonstrations.from_recording.unaided import unaided
 
@@ -32,12 +35,9 @@ def lifted_cube(seed: int, turn: Rotation, frames: int = 80, lift: int = 50) -> 
     spin = Rotation.from_rotvec(rng.uniform(-np.pi, np.pi, (frames, 1)) * [0.0, 0.0, 1.0])
     noise = Rotation.from_rotvec(rng.normal(scale=0.03, size=(frames, 3)))
     world = np.stack([np.zeros(frames), np.zeros(frames), height], axis=1) + rng.normal(scale=0.002, size=(frames, 3))
-    return RecordedObject(
-        rotation=(turn * noise * spin).as_matrix(),
-        position=turn.apply(world) + np.array([0.3, -0.2, 0.9]),
-        vertices=CUBE,
-        faces=np.array([[0, 1, 2]]),
-    )
+    turned = (turn * noise * spin).as_quat(scalar_first=True)
+    poses = np.concatenate([turn.apply(world) + np.array([0.3, -0.2, 0.9]), turned], axis=1)
+    return recorded_object("cube", poses, mesh=(CUBE, np.array([[0, 1, 2]])))
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -116,7 +116,7 @@ def test_what_is_missing_is_said_in_one_line(tmp_path):
 def test_the_real_bottle_stands_and_is_lifted():
     if not FOLDER.is_dir():
         pytest.skip(f"{FOLDER} is absent: the recording is not part of the project")
-    recorded = load_object(*recording_files(FOLDER))
+    (recorded,) = load_scene(recording_files(FOLDER)[0]).objects
     table = estimate_support_plane(recorded)
     assert 70 <= table.lifted <= 80
     corners = np.einsum("tij,vj->tvi", recorded.rotation, recorded.vertices[::50]) + recorded.position[:, None]

@@ -17,8 +17,8 @@ from mjx_hand.capture.keypoints.picture import picture_warning
 from mjx_hand.capture.keypoints.plausible import keypoint_findings
 from mjx_hand.capture.keypoints.recording import SIDES, KeypointRecording
 from mjx_hand.capture.keypoints.side import known_side
-from mjx_hand.cli.facts_of import Facts, frames, share_missing
-from mjx_hand.cli.wording import as_options
+from mjx_hand.cli.facts.facts_of import Facts, frames, share_missing
+from mjx_hand.cli.terminal.wording import as_options
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
 from mjx_hand.pytree import replace

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from mjx_hand.capture.markers.marker_set import load_marker_set
-from mjx_hand.cli.facts_of import Facts
+from mjx_hand.cli.facts.facts_of import Facts
 from mjx_hand.files.text_table import read_lines
 from mjx_hand.hand.load import load_hand
 from mjx_hand.robots.robot_hand import load_robot

@@ -1,0 +1,136 @@
+"""The constant press: a baseline that learns nothing and presses harder, with one strength for each grasp type.
+
+Pads press with the reference's own grip (`envs.grip`) at a constant force. Wraps add the torques that close the hand
+(`GraspType.closing`, which no policy is told), from before the object moves until the end. The strength of each type is
+the best of a grid on the training demonstrations.
+"""
+
+import dataclasses
+from collections.abc import Mapping
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+from scipy.spatial.transform import Rotation
+
+from envs.evaluation.evaluate import evaluate
+from envs.evaluation.roll_out import make_roll_out, zero_residual
+from envs.grasps import grasp_names, grasp_type
+from envs.grasps.grasp_type import Pads, Wrap, wrap_torque
+from envs.reference import grip_table
+from envs.scene import NUM_WRIST
+from envs.tracking import Tables, TrackingEnv
+from mjx_hand.files.array_cache import cached, model_bytes
+from mjx_hand.motion.demonstration import Demonstration
+
+# Of full strength, which is what a type's demonstrations are made with, and where they are of no type, this many times
+# the force of the reference.
+SHARES = (0.25, 0.375, 0.5, 2 / 3, 0.75, 1.0, 1.25, 1.5, 2.0)
+_UNKNOWN_FULL = 4.0
+_RAMP = 0.6  # s before the object first moves, in which a wrap closes
+_MOVED, _TURNED = 0.002, np.deg2rad(2.0)  # m, rad from its first pose
+_JUDGED_BY = ("chord", "hold", "manip_trans_object")
+
+
+@dataclasses.dataclass(frozen=True)
+class ConstantPress:
+    """How the demonstrations of an environment can be pressed.
+
+    Attributes:
+        env: the environment.
+        full: force (N) at full strength by type that presses with pads, None of those that wrap.
+        contact: hinge offsets (rad) that put pads on the surface.
+        press: hinge offsets (rad) of full strength, before the controllers' limits.
+    """
+
+    env: TrackingEnv
+    full: Mapping[str, float | None]
+    contact: Float[Array, "d t 26"]
+    press: Float[Array, "d t 26"]
+
+    def tables(self, strengths: Mapping[str, float]) -> Tables:
+        """The environment's tables with controls that press with these shares of full strength, by type.
+
+        Full strength where a type has none, as where no training demonstration is of it.
+        """
+        env, gains = self.env, self.env.gains
+        limit = np.concatenate([np.zeros(NUM_WRIST), gains.force_limit / gains.stiffness])
+        share = np.array([strengths.get(d.grasp, 1.0) for d in env.demonstrations])[:, None, None]
+        grip = self.contact + jnp.clip(share * self.press, -limit, limit)
+        reference = env.reference
+        controls = reference.controls - reference.grip + grip
+        changed = dataclasses.replace(reference, controls=controls, grip=grip)
+        return dataclasses.replace(env.tables, reference=changed)
+
+    def described(self, strengths: Mapping[str, float]) -> dict[str, str]:
+        """Each type's constant in words."""
+        return {
+            grasp: f"{share:.3g} × its closing torques" if full is None else f"{share * full:.3g} N"
+            for grasp, full in self.full.items()
+            for share in (strengths.get(grasp, 1.0),)
+        }
+
+
+def constant_press(env: TrackingEnv) -> ConstantPress:
+    """What presses the demonstrations of an environment."""
+    full = {d.grasp: _full(d, env) for d in env.demonstrations}
+    forces = np.array([np.nan if (force := full[d.grasp]) is None else force for d in env.demonstrations])
+    # The grip is an offset to the surface and torques in proportion to the force, which 1 N leaves within all limits.
+    given = env.demonstrations, env.hands, env.reference.targets
+    contact, one = (grip_table(*given, np.where(forces >= 0, force, np.nan), env.gains) for force in (0.0, 1.0))
+    press = np.array((one - contact) * np.nan_to_num(forces)[:, None, None])
+    for k, d in enumerate(env.demonstrations):
+        if full[d.grasp] is None:
+            closing = grasp_type(d.grasp).closing
+            assert isinstance(closing, Wrap)
+            ramp = _ramp(d, press.shape[1])
+            press[k, :, NUM_WRIST:] = ramp[:, None] * wrap_torque(closing) / env.gains.stiffness
+    return ConstantPress(env, full, contact, jnp.asarray(press, jnp.float32))
+
+
+def search_press(env: TrackingEnv, hold: float) -> dict[str, float]:
+    """The share of full strength that is best for each type, of `SHARES`.
+
+    Judged by the mean of CHORD, hold and ManipTrans' object criterion over the environment's demonstrations.
+
+    Args:
+        env: of training demonstrations.
+        hold: how long they are held on (s).
+    """
+
+    def compute() -> dict[str, np.ndarray]:
+        press, roll_out = constant_press(env), make_roll_out(env, zero_residual, hold)
+        scores = []
+        for share in SHARES:
+            rollouts = roll_out(None, press.tables(dict.fromkeys(press.full, share)))
+            found = evaluate(rollouts, [d.object for d in env.demonstrations]).scores
+            scores.append(np.mean([found[name] for name in _JUDGED_BY if name in found], axis=0))
+        return {"scores": np.array(scores)}
+
+    models = [model_bytes(model) for model in env.models]
+    scores = cached(compute, "press", *models, env.reference, env.task.substeps, env.engine.name, hold, SHARES)[
+        "scores"
+    ]
+    grasps = np.array([d.grasp for d in env.demonstrations])
+    return {
+        str(grasp): SHARES[int(scores[:, grasps == grasp].mean(axis=1).argmax())] for grasp in dict.fromkeys(grasps)
+    }
+
+
+def _full(demonstration: Demonstration, env: TrackingEnv) -> float | None:
+    """Newtons of full strength, or None where the demonstration's type wraps."""
+    if demonstration.grasp not in grasp_names():
+        return _UNKNOWN_FULL * (env.task.grip_force or 1.0)
+    closing = grasp_type(demonstration.grasp).closing
+    return closing.force if isinstance(closing, Pads) else None
+
+
+def _ramp(demonstration: Demonstration, frames: int) -> Float[np.ndarray, "{frames}"]:
+    """From 0 to 1 in the time before the object first moves, and 1 from then on."""
+    pose = demonstration.object_pose
+    turned = Rotation.from_quat(pose[:, 3:], scalar_first=True)
+    away = np.linalg.norm(pose[:, :3] - pose[0, :3], axis=1) > _MOVED
+    moves = away | ((turned * turned[0].inv()).magnitude() > _TURNED)
+    first = int(np.argmax(moves)) if moves.any() else len(pose)
+    length = max(round(_RAMP * demonstration.motion.fps), 1)
+    return np.clip((np.arange(frames) - (first - length)) / length, 0.0, 1.0)

@@ -1,0 +1,1 @@
+"""Poses of recorded objects: from files, from clusters of markers, from data sets."""
