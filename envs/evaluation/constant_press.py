@@ -23,10 +23,9 @@ from envs.tracking import Tables, TrackingEnv
 from mjx_hand.files.array_cache import cached, model_bytes
 from mjx_hand.motion.demonstration import Demonstration
 
-# Of full strength, which is what a type's demonstrations are made with, and where they are of no type, this many times
-# the force of the reference.
+# What is tried, as shares of full strength: the force or torques that a type's demonstrations are made with.
 SHARES = (0.25, 0.375, 0.5, 2 / 3, 0.75, 1.0, 1.25, 1.5, 2.0)
-_UNKNOWN_FULL = 4.0
+_UNKNOWN_FULL = 4.0  # full strength of demonstrations of no type, as a multiple of the reference's force
 _RAMP = 0.6  # s before the object first moves, in which a wrap closes
 _MOVED, _TURNED = 0.002, np.deg2rad(2.0)  # m, rad from its first pose
 _JUDGED_BY = ("chord", "hold", "manip_trans_object")

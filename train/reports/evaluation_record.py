@@ -20,7 +20,7 @@ from train.experiment.evaluate_seeds import POLICY, Results, shared_folder
 from train.reports.type_table import type_scores
 from train.settings.config import Config
 
-SCHEMA = "mjx-hand/evaluation/1"
+SCHEMA = "mjx-hand/evaluation/2"  # 2: with the constant press
 
 
 def write_results(results: Mapping[int, Results], configs: Sequence[Config], films: Mapping[str, Any]) -> Path:
@@ -85,8 +85,8 @@ def cached_results(configs: Sequence[Config]) -> dict[str, Any] | None:
 
 
 def evaluation_fingerprint(configs: Sequence[Config]) -> str:
-    """A digest of all that an evaluation depends on: settings, demonstrations, policies and the version."""
-    content = hashlib.sha256(version("mjx-hand").encode())
+    """A digest of all that an evaluation depends on: settings, demonstrations, policies, and the versions."""
+    content = hashlib.sha256(f"{SCHEMA} {version('mjx-hand')}".encode())
     for config in configs:
         parts = [fingerprint(config.data)]
         parts += [dataclasses.asdict(part) for part in (config.task, config.ppo, config.checks)]
