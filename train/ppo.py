@@ -158,7 +158,9 @@ class _Run:
                 if stopped:
                     self._save()
                     return stopped
-                self.state, metrics = self.learner.update(self.state, self.updates / self.budget)
+                # To its end: Warp's calls of two programs at a time, as of an evaluation that does not need this update's
+                # result, take the stream from each other ("unknown stream").
+                self.state, metrics = jax.block_until_ready(self.learner.update(self.state, self.updates / self.budget))
                 self.updates += 1
                 if untrained is not None:
                     self._say_memory()

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from omegaconf import OmegaConf
 
+import train.ppo
 from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from train.experiment.evaluate_seeds import POLICY, ZERO, evaluate_checkpoint
 from train.experiment.setup import chosen_checkpoint
 from train.learning.checkpoint import load_checkpoint, save_checkpoint
 from train.learning.curve import Point
-from train.ppo import train
+from train.learning.learner import Learner
 from train.settings.config import Config, compose
 from train.settings.options import Checks
 
@@ -79,7 +80,7 @@ def test_checkpoints_say_where_they_come_from(trained: Trained, env: TrackingEnv
 
 def test_learning_changes_every_layer(trained: Trained, tiny: Config, env: TrackingEnv, tmp_path):
     out, _ = trained
-    stopped = train(in_folder(tiny, tmp_path, checks=Checks(every=32, stop_at=0.0)), env)
+    stopped = train.ppo.train(in_folder(tiny, tmp_path, checks=Checks(every=32, stop_at=0.0)), env)
     assert [point.steps for point in stopped] == [0], "stop_at was reached before any learning"
     before, after = arrays(tmp_path / "last.npz"), arrays(out / "last.npz")
     layers = [name for name in after if name.startswith(("policy/", "value/"))]
@@ -101,12 +102,12 @@ def test_a_training_that_is_watched_can_be_ended_and_goes_on(
         seen.append((len(points), points[-1].steps, evaluating))
         return True
 
-    stopped = train(in_folder(tiny, tmp_path), env, enough)
+    stopped = train.ppo.train(in_folder(tiny, tmp_path), env, enough)
     assert [point.steps for point in stopped] == [0, 32]  # an update is 32 steps, after which it is asked
     ((count, steps, evaluating),) = seen
     assert (count, steps) == (2, 32)
     assert 0 < evaluating < stopped[-1].seconds
-    train(in_folder(tiny, tmp_path), env)
+    train.ppo.train(in_folder(tiny, tmp_path), env)
     first, second = arrays(out / "last.npz"), arrays(tmp_path / "last.npz")
     for key in first:
         np.testing.assert_array_equal(second[key], first[key])
@@ -114,7 +115,7 @@ def test_a_training_that_is_watched_can_be_ended_and_goes_on(
 
 def test_the_same_seed_gives_the_same_policy_bit_for_bit(trained: Trained, tiny: Config, env: TrackingEnv, tmp_path):
     out, points = trained
-    again = train(in_folder(tiny, tmp_path), env)
+    again = train.ppo.train(in_folder(tiny, tmp_path), env)
     assert [(p.steps, p.success, p.tracking_error_cm, p.rotation_error_deg) for p in again] == [
         (p.steps, p.success, p.tracking_error_cm, p.rotation_error_deg) for p in points
     ]
@@ -129,7 +130,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_any_work(tiny: Config
     (tmp_path / "file").touch()
     nowhere = in_folder(tiny, tmp_path / "file" / "out", demonstrations=str(tmp_path / "none"))
     with pytest.raises(InputError, match=r"cannot write .*file/out: .*; choose another folder with out=FOLDER"):
-        train(nowhere)
+        train.ppo.train(nowhere)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
@@ -151,8 +152,37 @@ def test_a_short_training_beats_the_zero_residual(tmp_path):
     folders = [f"out={tmp_path / 'out'}", f"demonstrations={tmp_path / 'demonstrations'}"]
     few = ["data.people=4", "data.heldout_people=4", "ppo.num_timesteps=300000", "checks.stop_at=0.95"]
     config = compose(["config=pinch_demo", "engine=native", *folders, *few])
-    train(config)
+    train.ppo.train(config)
     evaluations = evaluate_checkpoint(config).evaluations
     policy, zero = evaluations[POLICY].rows(), evaluations[ZERO].rows()
     assert policy["manip_trans_object"] >= zero["manip_trans_object"] + 0.25
     assert policy["tracking_error_cm"] < 0.7 * zero["tracking_error_cm"]
+
+
+def test_an_update_has_ended_before_anything_else_runs(tiny: Config, env: TrackingEnv, tmp_path, monkeypatch):
+    class Running:
+        """Part of what an update returns; it stands for a device at work until someone waits for it."""
+
+        def block_until_ready(self) -> None:
+            seen.append("end of an update")
+
+        def __array__(self, dtype: Any = None, copy: Any = None) -> np.ndarray:
+            return np.zeros((), dtype)
+
+    seen = []
+    update, evaluate = Learner.update, train.ppo.evaluate
+
+    def begun(self: Learner, *args: Any) -> tuple[Any, Any]:
+        seen.append("update")
+        state, metrics = update(self, *args)
+        return state, {**metrics, "running": Running()}
+
+    def evaluated(*args: Any) -> Any:
+        seen.append("evaluation")
+        return evaluate(*args)
+
+    monkeypatch.setattr(Learner, "update", begun)
+    monkeypatch.setattr(train.ppo, "evaluate", evaluated)
+    train.ppo.train(in_folder(tiny, tmp_path), env)
+    one = ["update", "end of an update"]
+    assert seen == [*one, "evaluation", "evaluation", *one, "evaluation"]
