@@ -2,6 +2,7 @@ from envs.demonstrations.dataset import make_set as make_set
 from envs.demonstrations.load_env import load as load
 from envs.demonstrations.set_settings import SetSettings as SetSettings
 from envs.demonstrations.twin_hands import twins as twins
+from envs.disturbances.randomize import Randomize as Randomize
 from envs.evaluation.evaluate import Evaluation as Evaluation
 from envs.evaluation.evaluate import evaluate as evaluate
 from envs.evaluation.roll_out import make_roll_out as make_roll_out
@@ -17,5 +18,5 @@ from envs.physics.engine import PhysicsState as PhysicsState
 from envs.rewards import RewardWeights as RewardWeights
 from envs.task import Task as Task
 from envs.tracking import TrackingEnv as TrackingEnv
-from envs.tracking import Twin as Twin
-from envs.tracking import twin_of as twin_of
+from envs.twin import Twin as Twin
+from envs.twin import twin_of as twin_of

@@ -14,6 +14,7 @@ from mjx_hand.player.features import OBSERVATION_LIMIT, Feature, Seen, feature_t
 from mjx_hand.rotations import axis_angle_matrix, quaternion_difference, quaternion_to_matrix
 
 _NUM_TARGETS = NUM_WRIST + NUM_HINGES
+_PROPERTIES = ("object_mass", "object_friction")  # what no camera sees
 
 
 def wrist_rotation(turns: Float[Array, "3"], base: Float[Array, "3 3"]) -> Float[Array, "3 3"]:
@@ -35,7 +36,8 @@ def residual_scale(task: Task) -> Float[np.ndarray, "26"]:
 
 def observed_features(task: Task) -> tuple[Feature, ...]:
     """What a policy of this task sees, in order."""
-    return feature_table(residual_scale(task), task.lookahead, OBJECT_KINDS)
+    table = feature_table(residual_scale(task), task.lookahead, OBJECT_KINDS)
+    return table if task.observe_properties else tuple(feature for feature in table if feature.name not in _PROPERTIES)
 
 
 def observe(

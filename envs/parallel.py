@@ -5,7 +5,8 @@ import jax.numpy as jnp
 from brax.envs.base import Env, State
 from jaxtyping import Array, Float, Int
 
-from envs.tracking import Tables, TrackingEnv, Twin, twin_of
+from envs.tracking import TrackingEnv
+from envs.twin import Tables, Twin, twin_of
 from mjx_hand.pytree import pytree
 
 

@@ -1,5 +1,6 @@
 """`Reference`: a set of demonstrations as arrays that an environment can index inside jit."""
 
+import dataclasses
 from collections.abc import Sequence
 
 import jax
@@ -12,12 +13,13 @@ from envs.grasps import grasp_names, grasp_type
 from envs.grip import grip_offsets
 from envs.scene import NUM_WRIST, base_rotation, wrist_coordinates
 from mjx_hand.errors import InputError
+from mjx_hand.files.array_cache import cached
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.objects.description import OBJECT_KINDS, ObjectDescription
 from mjx_hand.objects.primitives import hull_planes
 from mjx_hand.pytree import pytree
 from mjx_hand.rigid.gains import Gains
-from mjx_hand.rigid.rigid_hand import RigidHand, finger_tips, stack_hands
+from mjx_hand.rigid.rigid_hand import RigidHand, finger_tips, stack_hands, without_meshes
 
 
 @pytree
@@ -86,6 +88,20 @@ def make_reference(
         features=jnp.asarray(features, jnp.float32),
         length=jnp.array([d.num_frames for d in demonstrations]),
     )
+
+
+def cached_reference(
+    demonstrations: Sequence[Demonstration], hands: Sequence[RigidHand], grip_force: float | None, gains: Gains
+) -> Reference:
+    """`make_reference`, kept on disk."""
+
+    def compute() -> dict[str, np.ndarray]:
+        made = make_reference(demonstrations, hands, grip_force=grip_force, gains=gains)
+        return {field.name: np.asarray(getattr(made, field.name)) for field in dataclasses.fields(made)}
+
+    bare = [without_meshes(hand) for hand in hands]
+    arrays = cached(compute, list(demonstrations), bare, grip_force, dataclasses.astuple(gains))
+    return Reference(**{name: jnp.asarray(array) for name, array in arrays.items()})
 
 
 def grip_table(

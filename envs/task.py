@@ -34,6 +34,7 @@ class Task:
         grip_force: force (N) with which the reference presses fingers that touch; 0 leaves demonstrations as they are,
             null takes that of each demonstration's grasp type.
         lookahead: how many frames ahead the policy sees the reference.
+        observe_properties: whether the policy sees the object's mass and friction, which no camera does.
     """
 
     substeps: int = 5
@@ -51,6 +52,7 @@ class Task:
     random_start_prob: float = 0.7
     grip_force: float | None = None
     lookahead: tuple[int, ...] = (1, 4, 12)
+    observe_properties: bool = True
 
     def __post_init__(self):
         positive = (

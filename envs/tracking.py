@@ -7,7 +7,6 @@ residual <- tau residual + (1 - tau) scale action (arXiv 2512.07359, section IV)
 import copy
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, cast
 
 import jax
 import jax.numpy as jnp
@@ -15,61 +14,29 @@ import numpy as np
 from brax.envs.base import Env, State
 from jaxtyping import Array, Float, Int
 
+from envs.disturbances.episode import delayed, pushing, seen_pose
+from envs.disturbances.randomize import Randomize
+from envs.disturbances.tables import disturbance_tables, disturbed_start
+from envs.disturbances.variation import Variation, draw_variations, varied_models
 from envs.observation import observe, residual_scale
 from envs.physics import make_engine
 from envs.physics.engine import PhysicsState
-from envs.reference import Reference, make_reference
+from envs.reference import Reference, cached_reference
 from envs.replay import assisted_replay
 from envs.rewards import TrackedStep, metric_names, weighted_terms
 from envs.scene import NUM_WRIST, OBJECT, demonstration_models
 from envs.task import Task
+from envs.twin import Tables, Twin, twin_of
 from mjx_hand.errors import InputError
 from mjx_hand.files.array_cache import cached, model_bytes
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.motion.demonstration import Demonstration
-from mjx_hand.pytree import pytree
 from mjx_hand.rigid.gains import Gains
-from mjx_hand.rigid.rigid_hand import RigidHand, without_meshes
+from mjx_hand.rigid.rigid_hand import RigidHand
 from mjx_hand.rotations import quaternion_difference
 
+_VARIATION_SEED = 20  # of what is drawn when an environment is made
 _TAIL = 10  # no episode starts in a demonstration's last frames, where nothing is left to learn
-
-
-@pytree
-class Twin:
-    """A world's state: physics, which demonstration it follows, how far it is, and the residual so far."""
-
-    physics: PhysicsState
-    demonstration: Int[Array, "*b"]
-    frame: Int[Array, "*b"]
-    residual: Float[Array, "*b 26"]
-
-
-@pytree
-class Tables:
-    """What an environment looks up: arrays that a compiled function can be given as an argument.
-
-    What was compiled over `env.with_tables(argument)` runs any other set of equally many, equally long demonstrations.
-
-    Attributes:
-        reference: the demonstrations and their controls.
-        starts: the engine's state at every frame of every demonstration.
-        inertia: mass (kg) and mean moment of inertia (kg m2) of each demonstration's object.
-        low, high: limits of the targets (m, rad).
-        engine: the engine's own (`Engine.tables`).
-    """
-
-    reference: Reference
-    starts: PhysicsState
-    inertia: Float[Array, "d 2"]
-    low: Float[Array, "26"]
-    high: Float[Array, "26"]
-    engine: Any
-
-
-def twin_of(state: State) -> Twin:
-    """What a state of `TrackingEnv` carries; Brax's own type for it is that of its physics."""
-    return cast(Twin, state.pipeline_state)
 
 
 class TrackingEnv(Env):
@@ -83,11 +50,14 @@ class TrackingEnv(Env):
         engine: "auto", "native", "mjx" or "warp".
         task: rewards, residual ranges, resets.
         gains: of the hand's position controllers.
+        randomize: what disturbs its episodes; None for nothing.
 
     Attributes:
         demonstrations, hands: what it was built over.
         gains: of the hand's position controllers.
-        models: MuJoCo's of each demonstration's scene.
+        models: MuJoCo's of each demonstration's scene, undisturbed.
+        variations: how the engine's scenes differ from these, for each demonstration; one that differs in nothing
+            without disturbances.
         tables: what it looks up; `with_tables` puts another set's in their place.
 
     Raises:
@@ -101,14 +71,23 @@ class TrackingEnv(Env):
         engine: str = "auto",
         task: Task | None = None,
         gains: Gains | None = None,
+        randomize: Randomize | None = None,
     ):
         self.demonstrations, self.hands = tuple(demonstrations), tuple(hands)
         self.task = Task() if task is None else task
         self.gains = gains = Gains() if gains is None else gains
-        reference = _cached_reference(demonstrations, hands, self.task.grip_force, gains)
+        reference = cached_reference(demonstrations, hands, self.task.grip_force, gains)
         self.assisted = self.task.assist > 0
-        self.models = demonstration_models(demonstrations, hands, gains=gains, assisted=self.assisted)
-        self.engine = make_engine(engine, self.models, self.task.substeps)
+        self.randomize = randomize
+        self.models = demonstration_models(
+            demonstrations, hands, gains=gains, assisted=self.assisted or randomize is not None
+        )
+        self.variations: list[list[Variation]] = [[Variation()] for _ in self.demonstrations]
+        scenes = self.models
+        if randomize is not None:
+            self.variations = draw_variations(randomize, len(self.demonstrations), _VARIATION_SEED)
+            scenes = varied_models(self.demonstrations, self.hands, self.variations, gains)
+        self.engine = make_engine(engine, scenes, self.task.substeps)
         self.dt = float(self.models[0].opt.timestep * self.task.substeps)
         self.fps = demonstrations[0].motion.fps
         if abs(self.fps * self.dt - 1) > 1e-3:
@@ -117,13 +96,17 @@ class TrackingEnv(Env):
                 f"resample them to {1 / self.dt:g} frames/s"
             )
         low, high = self.models[0].actuator_ctrlrange[: self.action_size].T
+        starts = self._start_table(reference)
         self.tables = Tables(
             reference=reference,
-            starts=self._start_table(reference),
+            starts=starts,
             inertia=jnp.array([[m.body(OBJECT).mass[0], m.body(OBJECT).inertia.mean()] for m in self.models]),
             low=jnp.asarray(low, jnp.float32),
             high=jnp.asarray(high, jnp.float32),
             engine=self.engine.tables,
+            disturbances=None
+            if randomize is None
+            else disturbance_tables(randomize, self.demonstrations, self.variations, reference, starts, self._states),
         )
 
     def with_tables(self, tables: Tables) -> "TrackingEnv":
@@ -170,16 +153,26 @@ class TrackingEnv(Env):
         last = jnp.maximum(self.reference.length[demonstration] - _TAIL, 1)
         frame = jax.random.randint(where, (), 0, last)
         frame = jnp.where(jax.random.bernoulli(whether, self.task.random_start_prob), frame, 0)
-        return self.start(demonstration, frame)
+        return self.start(demonstration, frame, jax.random.fold_in(rng, 0))
 
-    def start(self, demonstration: Int[Array, ""], frame: Int[Array, ""]) -> State:
-        """The state at a frame of a demonstration; frame 0 is the unassisted start that evaluations use."""
+    def start(self, demonstration: Int[Array, ""], frame: Int[Array, ""], rng: Array | None = None) -> State:
+        """The state at a frame of a demonstration; frame 0 is the unassisted start that evaluations use.
+
+        Disturbances are drawn with `rng`; without one they are the same for a demonstration whenever it starts. Where
+        they put the object elsewhere it starts at frame 0, whatever frame is asked for.
+        """
+        demonstration, frame = jnp.asarray(demonstration, jnp.int32), jnp.asarray(frame, jnp.int32)
         physics = jax.tree.map(lambda table: table[demonstration, frame], self.tables.starts)
+        episode = None
+        if (tables := self.tables.disturbances) is not None:
+            key = jax.random.fold_in(jax.random.key(0), demonstration) if rng is None else rng
+            frame, physics, episode = disturbed_start(tables, self.reference, demonstration, frame, physics, key)
         twin = Twin(
             physics=physics,
-            demonstration=jnp.asarray(demonstration, jnp.int32),
-            frame=jnp.asarray(frame, jnp.int32),
+            demonstration=demonstration,
+            frame=frame,
             residual=jnp.zeros(self.action_size),
+            episode=episode,
         )
         zero = jnp.zeros(())
         names = (*metric_names(self.task.rewards), "error/position", "error/rotation", "unstable")
@@ -197,11 +190,16 @@ class TrackingEnv(Env):
         task, progress = self.task, state.info["progress"]
         action = jnp.clip(action, -1.0, 1.0)
         frame, residual, targets = self.command(twin, action)
+        episode, tables, force = twin.episode, self.tables.disturbances, None
         if self.assisted:
-            targets = jnp.concatenate([targets, self._assistance(twin, frame, progress)])
-        physics = self.engine.step(twin.physics, targets)
+            force = self._assistance(twin, frame, progress)
+        if episode is not None and tables is not None:
+            episode, targets = delayed(episode, targets)
+            push = pushing(episode, tables.episode, frame)
+            force = push if force is None else force + push
+        physics = self.engine.step(twin.physics, targets if force is None else jnp.concatenate([targets, force]))
         before = twin.residual
-        twin = Twin(physics=physics, demonstration=twin.demonstration, frame=frame, residual=residual)
+        twin = Twin(physics=physics, demonstration=twin.demonstration, frame=frame, residual=residual, episode=episode)
 
         position, rotation = self._errors(twin)
         terms = weighted_terms(task.rewards, self._tracked(twin, position, rotation, action, residual - before))
@@ -244,7 +242,12 @@ class TrackingEnv(Env):
         return jnp.concatenate([mass * force, inertia * torque])
 
     def _observe(self, twin: Twin) -> Float[Array, "o"]:
-        return observe(self.reference, self.task, twin.demonstration, twin.frame, twin.physics, twin.residual)
+        physics, tables = twin.physics, self.tables.disturbances
+        if twin.episode is not None and tables is not None:
+            n = self.action_size
+            seen = seen_pose(twin.episode, tables.episode, twin.frame, physics.qpos[n:])
+            physics = dataclasses.replace(physics, qpos=jnp.concatenate([physics.qpos[:n], seen]))
+        return observe(self.reference, self.task, twin.demonstration, twin.frame, physics, twin.residual)
 
     def _tracked(self, twin: Twin, position: Array, rotation: Array, action: Array, moved: Array) -> TrackedStep:
         """What the reward is counted from; `moved` is how far the residual went in this step."""
@@ -279,20 +282,13 @@ class TrackingEnv(Env):
         replayed = cached(compute, *(model_bytes(m) for m in self.models), reference, self.task.substeps)
         qpos, qvel, ctrl = (replayed[name] for name in ("qpos", "qvel", "ctrl"))
         count, frames = qpos.shape[:2]
-        variant = np.repeat(np.arange(count, dtype=np.int32), frames)
-        ctrl = np.pad(ctrl, ((0, 0), (0, 0), (0, self.models[0].nu - self.action_size)))  # the object's motors rest
-        rows = (variant, *(a.reshape(count * frames, -1) for a in (qpos, qvel, ctrl)))
-        table = jax.jit(lambda r: jax.lax.map(lambda row: self.engine.reset(*row), r, batch_size=1024))(rows)
+        # Any of a demonstration's scenes will do: what a state holds does not depend on what is varied.
+        variant = np.repeat(np.arange(count, dtype=np.int32) * len(self.variations[0]), frames)
+        table = self._states(variant, *(a.reshape(count * frames, -1) for a in (qpos, qvel, ctrl)))
         return jax.tree.map(lambda leaf: leaf.reshape(count, frames, *leaf.shape[1:]), table)
 
-
-def _cached_reference(
-    demonstrations: Sequence[Demonstration], hands: Sequence[RigidHand], grip_force: float | None, gains: Gains
-) -> Reference:
-    def compute() -> dict[str, np.ndarray]:
-        made = make_reference(demonstrations, hands, grip_force=grip_force, gains=gains)
-        return {field.name: np.asarray(getattr(made, field.name)) for field in dataclasses.fields(made)}
-
-    bare = [without_meshes(hand) for hand in hands]
-    arrays = cached(compute, list(demonstrations), bare, grip_force, dataclasses.astuple(gains))
-    return Reference(**{name: jnp.asarray(array) for name, array in arrays.items()})
+    def _states(self, variant: np.ndarray, qpos: np.ndarray, qvel: np.ndarray, controls: np.ndarray) -> PhysicsState:
+        """The engine's states for rows of variant, qpos, qvel and the targets' controls."""
+        ctrl = np.pad(controls, ((0, 0), (0, self.models[0].nu - self.action_size)))  # the object's motors rest
+        rows = (variant, qpos, qvel, ctrl)
+        return jax.jit(lambda r: jax.lax.map(lambda row: self.engine.reset(*row), r, batch_size=1024))(rows)

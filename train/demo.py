@@ -29,7 +29,7 @@ from mjx_hand.view.figures import plots
 from mjx_hand.view.report import Film, Headline, Plot, Report, Section, write_report
 from train.evaluate import show
 from train.experiment.evaluate_seeds import POLICY, PRESS, REPLAY, ZERO, Results, evaluate_seeds, median_and_worst
-from train.experiment.setup import load_env
+from train.experiment.setup import training_env
 from train.learning.curve import Point
 from train.ppo import train
 from train.reports.evaluation_page import TRACKING, tables, tracking_plot
@@ -54,7 +54,7 @@ def main(config: Config) -> None:
 
     with _stage("demonstrations: performed, recorded with markers, fitted, projected", timings):
         make_missing_sets(config.data, config.demonstrations)
-        env = load_env(config, "train")
+        env = training_env(config)
     recording = set_folder(config.data, config.demonstrations) / "heldout" / "000.motion.npz"
     with _stage("retargeting a recording", timings):
         errors = _retarget(recording, out / "retargeted.npz")

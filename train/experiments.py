@@ -9,7 +9,7 @@ from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 from train.evaluate import evaluate_and_write
 from train.experiment.evaluate_seeds import shared_folder
-from train.experiment.setup import load_env
+from train.experiment.setup import training_env
 from train.learning.curve import is_finished, load_curve
 from train.ppo import train
 from train.reports.evaluation_record import cached_results
@@ -90,7 +90,7 @@ def measure(configs: Sequence[Config]) -> Experiment:
     summary = cached_results(configs) if finished and not configs[0].fresh else None
     if summary is None:
         make_missing_sets(configs[0].data, configs[0].demonstrations)
-        env = load_env(configs[0], "train")
+        env = training_env(configs[0])
         for config in configs:
             train(config, env)
         evaluate_and_write(configs)

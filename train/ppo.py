@@ -24,7 +24,7 @@ from envs.tracking import TrackingEnv
 from mjx_hand.files.npz_archive import replacing
 from mjx_hand.progress import counter
 from mjx_hand.pytree import pytree
-from train.experiment.setup import load_env
+from train.experiment.setup import training_env
 from train.learning.cadence import rollouts_per_demonstration, updates_between
 from train.learning.checkpoint import Checkpoint, is_saved, save_checkpoint
 from train.learning.curve import CURVE, Point, points_of
@@ -66,7 +66,7 @@ def _train(config: Config, env: TrackingEnv | None, folder: RunFolder, watch: Wa
     if env is None:
         available_engine(config.engine)  # before the minutes that sets take
         make_missing_sets(config.data, config.demonstrations)
-        env = load_env(config, "train")
+        env = training_env(config)
     learner = Learner(ParallelEnv(env, guard=config.debug.nan_guard), config.ppo)
     run = _Run(config, env, learner, folder)
     run.write_results()
@@ -158,8 +158,8 @@ class _Run:
                 if stopped:
                     self._save()
                     return stopped
-                # To its end: Warp's calls of two programs at a time, as of an evaluation that does not need this update's
-                # result, take the stream from each other ("unknown stream").
+                # To its end: Warp's calls of two programs at a time, as of an evaluation that does not need this
+                # update's result, take the stream from each other ("unknown stream").
                 self.state, metrics = jax.block_until_ready(self.learner.update(self.state, self.updates / self.budget))
                 self.updates += 1
                 if untrained is not None:

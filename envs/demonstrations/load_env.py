@@ -5,6 +5,7 @@ from pathlib import Path
 from envs.demonstrations.load_set import load_demonstrations
 from envs.demonstrations.set_settings import GIVEN, SetSettings
 from envs.demonstrations.twin_hands import twins
+from envs.disturbances.randomize import Randomize
 from envs.task import Task
 from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
@@ -17,6 +18,7 @@ def load(
     task: Task | None = None,
     root: str | Path = "outputs/demonstrations",
     folder: str | Path | None = None,
+    randomize: Randomize | None = None,
 ) -> TrackingEnv:
     """The tracking environment over the demonstrations of a grasp type, or over a folder of finished ones.
 
@@ -32,6 +34,7 @@ def load(
         task: residuals, rewards, resets; None for the default.
         root: folder below which demonstration sets are kept.
         folder: of `train/NNN.npz` and `heldout/NNN.npz`, or of `NNN.npz` (`mjx_hand.save_demonstration` writes them).
+        randomize: what disturbs its episodes, such as `envs.Randomize(share=1.0)`; None for nothing.
 
     Raises:
         InputError: a type and a folder, or neither; a set that is not made; an empty folder; or as `TrackingEnv`.
@@ -39,14 +42,21 @@ def load(
     if bool(grasp) == (folder is not None):
         raise InputError(f"grasp is {grasp!r} and folder {folder}; give one of them")
     settings = SetSettings(grasp) if folder is None else SetSettings(GIVEN, folder=str(folder))
-    return env_of_set(settings, part, engine, task, root)
+    return env_of_set(settings, part, engine, task, root, randomize)
 
 
-def env_of_set(settings: SetSettings, part: str, engine: str, task: Task | None, root: str | Path) -> TrackingEnv:
+def env_of_set(
+    settings: SetSettings,
+    part: str,
+    engine: str,
+    task: Task | None,
+    root: str | Path,
+    randomize: Randomize | None = None,
+) -> TrackingEnv:
     """The environment over one part of any set, as `load`.
 
     Raises:
         InputError: as `load`.
     """
     demonstrations = load_demonstrations(settings, part, root)
-    return TrackingEnv(demonstrations, twins(demonstrations), engine, task)
+    return TrackingEnv(demonstrations, twins(demonstrations), engine, task, randomize=randomize)

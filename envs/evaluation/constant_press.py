@@ -19,7 +19,8 @@ from envs.grasps import grasp_names, grasp_type
 from envs.grasps.grasp_type import Pads, Wrap, wrap_torque
 from envs.reference import grip_table
 from envs.scene import NUM_WRIST
-from envs.tracking import Tables, TrackingEnv
+from envs.tracking import TrackingEnv
+from envs.twin import Tables
 from mjx_hand.files.array_cache import cached, model_bytes
 from mjx_hand.motion.demonstration import Demonstration
 
@@ -90,7 +91,8 @@ def constant_press(env: TrackingEnv) -> ConstantPress:
 def search_press(env: TrackingEnv, hold: float) -> dict[str, float]:
     """The share of full strength that is best for each type, of `SHARES`.
 
-    Judged by the mean of CHORD, hold and ManipTrans' object criterion over the environment's demonstrations.
+    Judged by the mean of CHORD, hold and ManipTrans' object criterion over the environment's demonstrations,
+    disturbed as its episodes are.
 
     Args:
         env: of training demonstrations.
@@ -107,9 +109,9 @@ def search_press(env: TrackingEnv, hold: float) -> dict[str, float]:
         return {"scores": np.array(scores)}
 
     models = [model_bytes(model) for model in env.models]
-    scores = cached(compute, "press", *models, env.reference, env.task.substeps, env.engine.name, hold, SHARES)[
-        "scores"
-    ]
+    told = (env.reference, env.task.substeps, env.engine.name, hold, SHARES)
+    disturbed = [] if env.randomize is None else [dataclasses.astuple(env.randomize)]
+    scores = cached(compute, "press", *models, *told, *disturbed)["scores"]
     grasps = np.array([d.grasp for d in env.demonstrations])
     return {
         str(grasp): SHARES[int(scores[:, grasps == grasp].mean(axis=1).argmax())] for grasp in dict.fromkeys(grasps)

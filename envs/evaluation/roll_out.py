@@ -10,7 +10,8 @@ from jaxtyping import Array, Float
 from envs.evaluation.rollout import Rollouts
 from envs.observation import wrist_rotation
 from envs.scene import NUM_WRIST
-from envs.tracking import Tables, TrackingEnv, twin_of
+from envs.tracking import TrackingEnv
+from envs.twin import Tables, twin_of
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics, stack_hands, tip_positions
 

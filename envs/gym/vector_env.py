@@ -15,7 +15,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from jaxtyping import Array, Bool, Float, Float32, Int
 
-from envs.tracking import Tables, TrackingEnv, twin_of
+from envs.tracking import TrackingEnv
+from envs.twin import Tables, twin_of
 from mjx_hand.errors import InputError
 from mjx_hand.player.features import OBSERVATION_LIMIT
 

@@ -10,7 +10,8 @@ from envs.demonstrations.scripted.trials import support_boxes
 from envs.grasps import grasp_type
 from envs.physics import make_engine
 from envs.scene import SPARE, TABLE, demonstration_model, demonstration_models
-from envs.tracking import TrackingEnv, twin_of
+from envs.tracking import TrackingEnv
+from envs.twin import twin_of
 from mjx_hand.errors import InputError
 from mjx_hand.objects.description import ObjectDescription
 from mjx_hand.pytree import replace

@@ -65,7 +65,7 @@ def test_flipped_bits_raise_an_input_error_or_load_inertly(place: int) -> None:
 @settings(deadline=None, max_examples=200)
 @given(data=st.binary(max_size=60), protocol=st.sampled_from([b"", b"\x80\x02", b"\x80\x04"]))
 def test_random_bytes_never_run(data: bytes, protocol: bytes) -> None:
-    with pytest.raises(InputError):
+    with one_line_input_error():  # a few are pickles, such as b"}." of an empty dictionary
         safe_pickle.read(protocol + data, "file")
 
 

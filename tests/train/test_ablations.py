@@ -139,7 +139,7 @@ def work(monkeypatch, tmp_path) -> list[str]:
         content = summary("spherical", [1.0] * len(configs)) | {"made_of": evaluation_fingerprint(configs)}
         (Path(configs[0].out).parent / "evaluation.json").write_text(json.dumps(content))
 
-    monkeypatch.setattr(experiments, "load_env", lambda config, part: None)
+    monkeypatch.setattr(experiments, "training_env", lambda config: None)
     monkeypatch.setattr(experiments, "make_missing_sets", lambda data, root: None)
     monkeypatch.setattr(experiments, "train", train)
     monkeypatch.setattr(experiments, "evaluate_and_write", evaluate)
@@ -176,7 +176,7 @@ def test_variants_that_are_done_are_shown_while_others_wait(work: list[str], mon
 def test_a_tiny_training_and_its_baselines(
     trained: tuple[Path, list[Point]], tiny: Config, env: TrackingEnv, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(experiments, "load_env", lambda config, part: env)
+    monkeypatch.setattr(experiments, "training_env", lambda config: env)
     monkeypatch.setattr(experiments, "make_missing_sets", lambda data, root: None)
     monkeypatch.setattr(video, "side_by_side", lambda env, rollouts, index, path: Path(path).write_bytes(b"film"))
     out = tmp_path / "tiny" / "as_configured" / "seed0"

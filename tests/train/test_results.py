@@ -214,7 +214,7 @@ def work(monkeypatch, tmp_path) -> list[str]:
         content = summary(configs[0].data.grasp, [1.0] * len(configs)) | {"made_of": evaluation_fingerprint(configs)}
         (Path(configs[0].out).parent / "evaluation.json").write_text(json.dumps(content))
 
-    monkeypatch.setattr(experiments, "load_env", lambda config, part: None)
+    monkeypatch.setattr(experiments, "training_env", lambda config: None)
     monkeypatch.setattr(experiments, "make_missing_sets", lambda data, root: None)
     monkeypatch.setattr(experiments, "train", train)
     monkeypatch.setattr(experiments, "evaluate_and_write", evaluate)
@@ -255,7 +255,7 @@ def test_ctrl_c_ends_in_one_line(work: list[str], monkeypatch, capsys):
     def stop(config: Config, part: str) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(experiments, "load_env", stop)
+    monkeypatch.setattr(experiments, "training_env", stop)
     monkeypatch.setattr(experiments, "make_missing_sets", lambda data, root: None)
     assert results.main(["names=[pinch]", "seeds=[0,1]", "ppo.num_timesteps=1000"]) == 130
     assert capsys.readouterr().err == "\nresults: stopped; the same command goes on from here\n"

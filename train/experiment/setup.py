@@ -8,11 +8,13 @@ import jax.numpy as jnp
 
 from envs.demonstrations.load_env import env_of_set
 from envs.demonstrations.load_set import is_divided
+from envs.disturbances.randomize import Randomize
 from envs.evaluation.evaluate import Evaluation, evaluate
 from envs.evaluation.roll_out import make_roll_out
 from envs.evaluation.rollout import Rollouts
 from envs.scene import NUM_WRIST
-from envs.tracking import Tables, TrackingEnv
+from envs.tracking import TrackingEnv
+from envs.twin import Tables
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
 from train.learning.checkpoint import Checkpoint, load_checkpoint
@@ -22,15 +24,29 @@ from train.settings.config import Config
 from train.settings.saved import FILE, contradiction, policy_settings, read_settings, with_settings_of
 
 
-def load_env(config: Config, part: str) -> TrackingEnv:
+def load_env(config: Config, part: str, randomize: Randomize | None = None) -> TrackingEnv:
     """The environment over one part ("train", "heldout") of the experiment's demonstrations.
+
+    Args:
+        config: the experiment.
+        part: of its demonstrations.
+        randomize: what disturbs episodes; nothing does by default, whatever the experiment trains with.
 
     Raises:
         InputError: a set that is not made, or as `TrackingEnv`.
     """
     if part == "heldout" and config.data.folder and not is_divided(config.data.folder):
         print(f"{config.data.folder} holds no demonstrations out: these are the ones for training", flush=True)
-    return env_of_set(config.data, part, config.engine, config.task, config.demonstrations)
+    return env_of_set(config.data, part, config.engine, config.task, config.demonstrations, randomize)
+
+
+def training_env(config: Config) -> TrackingEnv:
+    """The environment that the experiment trains in: its training part, disturbed as `randomize` says.
+
+    Raises:
+        InputError: as `load_env`.
+    """
+    return load_env(config, "train", config.randomize if config.randomize.share else None)
 
 
 def without_grip(env: TrackingEnv) -> Tables:

@@ -20,7 +20,7 @@ from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from jaxtyping import Array, Float, Int, UInt
 
 from envs.parallel import ParallelEnv
-from envs.tracking import Tables
+from envs.twin import Tables
 from mjx_hand.errors import InputError
 from mjx_hand.pytree import pytree
 from train.learning.policy import network_factory

@@ -11,9 +11,11 @@ from envs.evaluation.metrics import position_error
 from mjx_hand.view.figures import plots
 from mjx_hand.view.report import Film, Headline, Plot, Report, Section, Table
 from train.experiment.evaluate_seeds import BASELINES, POLICY, PRESS, REPLAY, ZERO, Results, median_and_worst
+from train.experiment.stress import Stress
 from train.reports.machine import processor, versions
 from train.reports.published import PAPER
 from train.reports.score_table import demonstration_table, failed_table, failure_table, score_table
+from train.reports.stress_table import stress_figure, stress_table
 from train.reports.type_table import type_table
 from train.settings.config import Config
 from train.view.video import film
@@ -71,8 +73,13 @@ def films(results: Mapping[int, Results], folder: Path) -> dict[str, Film]:
     return made
 
 
-def evaluation_page(results: Mapping[int, Results], configs: Sequence[Config], shown: Mapping[str, Film]) -> Report:
-    """Everything about an evaluation of one or several seeds."""
+def evaluation_page(
+    results: Mapping[int, Results],
+    configs: Sequence[Config],
+    shown: Mapping[str, Film],
+    disturbed: Stress | None = None,
+) -> Report:
+    """Everything about an evaluation of one or several seeds, under disturbances too where these were rolled out."""
     config, first = configs[0], next(iter(results.values()))
     policies = {seed: result.evaluations[POLICY] for seed, result in results.items()}
     baselines = {title: first.evaluations[title] for title in BASELINES}
@@ -108,6 +115,19 @@ def evaluation_page(results: Mapping[int, Results], configs: Sequence[Config], s
         sections=(
             Section("Success by every metric", [scores]),
             *([Section("Every grasp type", by_type)] if by_type else []),
+            *(
+                [
+                    Section(
+                        "Under disturbances",
+                        [
+                            Plot(stress_figure(disturbed), "Never lost and still held at the end."),
+                            stress_table(disturbed),
+                        ],
+                    )
+                ]
+                if disturbed
+                else []
+            ),
             Section("Demonstration and twin", [shown["worst"], shown["median"]]),
             Section("Tracking error over time", [Plot(tracking_plot(results), TRACKING)]),
             Section("How failures failed", [failures]),
@@ -121,7 +141,10 @@ def evaluation_page(results: Mapping[int, Results], configs: Sequence[Config], s
             ("machine", f"{processor()}, {len(jax.devices())} {jax.default_backend()} device(s)"),
             ("versions", ", ".join(f"{n} {v}" for n, v in versions("mjx-hand", "mujoco", "jax", "brax").items())),
         ],
-        commands=[f"python -m train.evaluate config={config.name} seeds=[{seeds.replace(' ', '')}]"],
+        commands=[
+            f"python -m train.evaluate config={config.name} seeds=[{seeds.replace(' ', '')}]"
+            + (" stress=true" if disturbed else "")
+        ],
     )
 
 

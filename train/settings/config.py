@@ -15,6 +15,7 @@ from omegaconf import DictConfig, ListConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from envs.demonstrations.set_settings import SetSettings
+from envs.disturbances.randomize import Randomize
 from envs.physics import ENGINES
 from envs.settings import from_dict
 from envs.task import Task
@@ -43,11 +44,13 @@ class Config:
         checkpoint: what to evaluate or play; empty for the best of `out`.
         data: which demonstrations; `data.folder=PATH` alone for finished ones.
         task: what an episode is.
+        randomize: what disturbs training's episodes.
         ppo: how to learn.
         checks: evaluation while training.
         fresh: start anew although `out` holds a training to go on from.
         distributed: several processes.
         debug: help with what goes wrong.
+        stress: whether evaluations test the policy under disturbances as well.
         play: what to show.
         export: what to write for other programs.
     """
@@ -62,11 +65,13 @@ class Config:
     checkpoint: str = ""
     data: SetSettings = dataclasses.field(default_factory=lambda: SetSettings(grasp="pinch"))
     task: Task = dataclasses.field(default_factory=Task)
+    randomize: Randomize = dataclasses.field(default_factory=Randomize)
     ppo: Ppo = dataclasses.field(default_factory=Ppo)
     checks: Checks = dataclasses.field(default_factory=Checks)
     fresh: bool = False
     distributed: Distributed = dataclasses.field(default_factory=Distributed)
     debug: Debug = dataclasses.field(default_factory=Debug)
+    stress: bool = False
     play: Play = dataclasses.field(default_factory=Play)
     export: Export = dataclasses.field(default_factory=Export)
 

@@ -30,6 +30,7 @@ _FREE = (
     "fresh",
     "distributed",
     "debug",
+    "stress",
     "play",
     "export",
     "checks",

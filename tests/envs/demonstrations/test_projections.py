@@ -15,7 +15,8 @@ from envs.demonstrations.load_set import PARTS, load_part
 from envs.demonstrations.scripted.simulated_capture import CaptureSettings
 from envs.demonstrations.set_settings import SetSettings, fingerprint, set_folder
 from envs.demonstrations.twin_hands import twins
-from envs.tracking import TrackingEnv, twin_of
+from envs.tracking import TrackingEnv
+from envs.twin import twin_of
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion.demonstration import Demonstration, load_demonstration, save_demonstration

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from envs.parallel import ParallelEnv
-from envs.tracking import TrackingEnv, twin_of
+from envs.tracking import TrackingEnv
+from envs.twin import twin_of
 from mjx_hand.errors import InputError
 from mjx_hand.pytree import replace
 from train.learning.learner import Learner

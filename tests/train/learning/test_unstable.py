@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from envs.parallel import Caught, ParallelEnv
-from envs.tracking import TrackingEnv, twin_of
+from envs.tracking import TrackingEnv
+from envs.twin import twin_of
 from mjx_hand.errors import InputError
 from mjx_hand.pytree import replace
 from mjx_hand.view.browser.scene import MeshLayer

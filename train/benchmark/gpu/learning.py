@@ -13,7 +13,7 @@ from train.benchmark.gpu.bench import Bench
 from train.benchmark.gpu.record import Record, Table
 from train.benchmark.gpu.scale import gpu_config
 from train.benchmark.learning import measure_learning
-from train.experiment.setup import load_env
+from train.experiment.setup import training_env
 from train.learning.curve import Point, is_finished
 from train.ppo import train
 from train.settings.config import Config
@@ -103,7 +103,7 @@ def _env(bench: Bench, config: Config, record: Record) -> TrackingEnv:
         if engine != bench.engine:
             record.notes.append(f"Physics is {engine}: {bench.engine} cannot, or would take minutes here.")
         make_missing_sets(config.data, config.demonstrations)
-        bench.trained[config.name] = load_env(dataclasses.replace(config, engine=engine), "train")
+        bench.trained[config.name] = training_env(dataclasses.replace(config, engine=engine))
     return bench.trained[config.name]
 
 

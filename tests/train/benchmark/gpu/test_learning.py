@@ -36,7 +36,7 @@ def test_the_story_tells_compiling_learning_and_evaluating_apart(bench, tmp_path
 @pytest.mark.parametrize(("name", "engine"), [("all", "native"), ("pinch", "warp")])
 def test_the_engine_is_the_experiments_own_or_else_the_measured_one(bench, monkeypatch, tmp_path, name, engine):
     made, env = [], bench.env("native", "pinch")
-    monkeypatch.setattr(learning, "load_env", lambda config, part: made.append(config.engine) or env)
+    monkeypatch.setattr(learning, "training_env", lambda config: made.append(config.engine) or env)
     monkeypatch.setattr(learning, "make_missing_sets", lambda data, root: None)
     scale = dataclasses.replace(REHEARSAL, training_engine=None)
     bench = dataclasses.replace(bench, engine="warp", scale=scale, trained={})

@@ -1,0 +1,107 @@
+"""The policies of several seeds and the constant press under disturbances that neither is told of.
+
+Each row sets one disturbance to one value (`envs.disturbances.Randomize.only`) for every held-out demonstration, from
+frame 0; directions differ from demonstration to demonstration. The last row draws all of them at once.
+"""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from jaxtyping import Bool
+
+from envs.disturbances.randomize import Randomize
+from envs.evaluation.constant_press import constant_press, search_press
+from envs.evaluation.evaluate import Evaluation, evaluate
+from envs.evaluation.roll_out import make_roll_out, zero_residual
+from mjx_hand.progress import counter
+from train.experiment.evaluate_seeds import HOLD
+from train.experiment.setup import chosen_checkpoint, load_env, training_env
+from train.learning.policy import deterministic_policy
+from train.settings.config import Config
+
+RECORDED = "as recorded"
+HALF = "all at once, drawn at half range"
+ROWS: Mapping[str, Randomize] = {
+    RECORDED: Randomize.only(),
+    "mass × 1.5": Randomize.only(mass=(1.5, 1.5)),
+    "mass × 2": Randomize.only(mass=(2.0, 2.0)),
+    "friction × 0.7": Randomize.only(friction=(0.7, 0.7)),
+    "friction × 0.5": Randomize.only(friction=(0.5, 0.5)),
+    "mass × 1.5 and friction × 0.7": Randomize.only(mass=(1.5, 1.5), friction=(0.7, 0.7)),
+    "size + 10 %": Randomize.only(size=(1.1, 1.1)),
+    "size - 10 %": Randomize.only(size=(0.9, 0.9)),
+    "moved 5 mm": Randomize.only(move=(0.005, 0.005)),
+    "moved 10 mm": Randomize.only(move=(0.01, 0.01)),
+    "moved 20 mm": Randomize.only(move=(0.02, 0.02)),
+    "moved 40 mm": Randomize.only(move=(0.04, 0.04)),
+    "push 5 N, 0.2 s": Randomize.only(push=(5.0, 5.0)),
+    "push 10 N, 0.2 s": Randomize.only(push=(10.0, 10.0)),
+    "pose seen 10 mm, 5° off": Randomize.only(seen_move=(0.01, 0.01), seen_turn_deg=(5.0, 5.0)),
+    "targets 40 ms late": Randomize.only(delay=(2, 2)),
+    HALF: dataclasses.replace(Randomize(share=0.5), variants=1, moved_share=1.0, push_prob=1.0),
+}
+# For curves: what is varied, and the rows by its value.
+CURVES: Mapping[str, Mapping[float, str]] = {
+    "moved (mm)": {0: RECORDED, 5: "moved 5 mm", 10: "moved 10 mm", 20: "moved 20 mm", 40: "moved 40 mm"},
+    "mass (factor)": {1: RECORDED, 1.5: "mass × 1.5", 2: "mass × 2"},
+    "friction (factor)": {0.5: "friction × 0.5", 0.7: "friction × 0.7", 1: RECORDED},
+    "push (N)": {0: RECORDED, 5: "push 5 N, 0.2 s", 10: "push 10 N, 0.2 s"},
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Stress:
+    """What rollouts under each row scored.
+
+    Attributes:
+        policies: by row, the evaluation of each seed's policy.
+        press: by row, that of the constant press.
+        strengths: of the press, in words, by grasp type.
+    """
+
+    policies: Mapping[str, Mapping[int, Evaluation]]
+    press: Mapping[str, Evaluation]
+    strengths: Mapping[str, str]
+
+
+def kept(evaluation: Evaluation) -> Bool[np.ndarray, "n"]:
+    """Whether each rollout was never lost (CHORD) and, where it ends raised, still held at the end."""
+    chord = np.asarray(evaluation.scores["chord"], bool)
+    return chord & np.asarray(evaluation.scores["hold"], bool) if "hold" in evaluation.scores else chord
+
+
+def stress(configs: Sequence[Config], part: str = "heldout") -> Stress:
+    """Roll out each seed's policy and the constant press under every row.
+
+    The press is the strongest that a search on the training demonstrations finds, disturbed as training was.
+
+    Args:
+        configs: an experiment with one seed after the other.
+        part: "heldout" or "train".
+
+    Raises:
+        InputError: a seed without a checkpoint, or with one of another task.
+    """
+    first = configs[0]
+    recorded = load_env(first, part, ROWS[RECORDED])
+    checkpoints = {config.seed: chosen_checkpoint(config, recorded.observation_size) for config in configs}
+    objects = [demonstration.object for demonstration in recorded.demonstrations]
+    policy = deterministic_policy(first.ppo, recorded.observation_size, recorded.action_size)
+    policies: dict[str, dict[int, Evaluation]] = {}
+    presses: dict[str, Evaluation] = {}
+    with counter(len(ROWS) + 1, "under disturbances (rows)") as advance:
+        strengths = search_press(training_env(first), HOLD)
+        press = constant_press(recorded)
+        pressed = press.tables(strengths).reference
+        advance(1)
+        # Compiled once: the rows' environments differ in their tables alone.
+        learned, zero = (make_roll_out(recorded, act, HOLD) for act in (policy, zero_residual))
+        for row, randomize in ROWS.items():
+            tables = load_env(first, part, randomize).tables
+            policies[row] = {
+                seed: evaluate(learned(checkpoint.policy, tables), objects) for seed, checkpoint in checkpoints.items()
+            }
+            presses[row] = evaluate(zero(None, dataclasses.replace(tables, reference=pressed)), objects)
+            advance(1)
+    return Stress(policies, presses, press.described(strengths))

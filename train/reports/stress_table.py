@@ -1,0 +1,101 @@
+"""What policies and the constant press do under disturbances, as a table, curves and a file."""
+
+import csv
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.stats import binomtest
+
+from envs.evaluation.evaluate import Evaluation
+from mjx_hand.files.npz_archive import replacing
+from mjx_hand.view.figures import plots
+from mjx_hand.view.report import Table
+from train.experiment.evaluate_seeds import POLICY, PRESS
+from train.experiment.stress import CURVES, Stress, kept
+
+SCHEMA = "mjx-hand/stress/1"
+_KEPT = "CHORD and held"
+_SCORES = {"CHORD": "chord", "held": "hold", "ManipTrans": "manip_trans_object"}
+
+
+def stress_table(stress: Stress) -> Table:
+    """A row a disturbance; of several seeds all rollouts together, with 95 % intervals (Wilson)."""
+    rows = []
+    for row, policies in stress.policies.items():
+        every, press = list(policies.values()), [stress.press[row]]
+        cells = [_with_interval(every), *(_share(every, name) for name in _SCORES.values())]
+        rows.append((row, *cells, _with_interval(press), *(_share(press, name) for name in _SCORES.values())))
+    seeds, count = len(next(iter(stress.policies.values()))), len(next(iter(stress.press.values())).demonstration)
+    columns = ("disturbance", *(f"{who}: {what}" for who in (POLICY, PRESS) for what in (_KEPT, *_SCORES)))
+    strengths = ", ".join(f"{grasp} {constant}" for grasp, constant in stress.strengths.items())
+    note = (
+        f"%; {count} held-out demonstrations, {seeds} seed{'s' if seeds > 1 else ''}, every rollout counted, from "
+        "frame 0; neither is told of the disturbance. In brackets 95 % intervals (Wilson). Constant press, the best on "
+        f"training demonstrations disturbed as in training: {strengths}"
+    )
+    return Table(columns, rows, note)
+
+
+def stress_figure(stress: Stress) -> Figure:
+    """Share that is kept over the size of a disturbance, a panel each."""
+
+    def curve(places: Mapping[float, str], of: Callable[[str], Sequence[Evaluation]]) -> np.ndarray:
+        return np.array([(value, *_interval(of(row))) for value, row in places.items()])
+
+    columns = {
+        POLICY: lambda row: list(stress.policies[row].values()),
+        PRESS: lambda row: [stress.press[row]],
+    }
+    panels = {varied: {name: curve(places, of) for name, of in columns.items()} for varied, places in CURVES.items()}
+    return plots.shares_over(panels)
+
+
+def write_stress(stress: Stress, folder: Path) -> None:
+    """Write `stress.json` (a share and its interval for each row) and `stress.csv` (every rollout)."""
+    rows = {
+        row: {
+            POLICY: _told(list(policies.values())),
+            PRESS: _told([stress.press[row]]),
+            "seeds": {seed: _told([evaluation]) for seed, evaluation in policies.items()},
+        }
+        for row, policies in stress.policies.items()
+    }
+    content = {"schema": SCHEMA, "constant_press": dict(stress.strengths), "rows": rows}
+    with replacing(folder / "stress.json") as temporary:
+        temporary.write_text(json.dumps(content, indent=1) + "\n")
+    with replacing(folder / "stress.csv") as temporary, temporary.open("w", newline="") as file:
+        names = list(next(iter(stress.press.values())).scores)
+        written = csv.writer(file)
+        written.writerow(["row", "column", "seed", "demonstration", *names, "failure"])
+        for row, policies in stress.policies.items():
+            for column, seed, e in [*((POLICY, s, e) for s, e in policies.items()), (PRESS, "", stress.press[row])]:
+                for k, which in enumerate(e.demonstration):
+                    scores = (f"{e.scores[name][k]:g}" for name in names)
+                    written.writerow([row, column, seed, int(which), *scores, e.failure[k]])
+
+
+def _told(evaluations: Sequence[Evaluation]) -> Mapping[str, float]:
+    share, low, high = _interval(evaluations)
+    scores = {name: float(np.mean([e.rows()[name] for e in evaluations])) for name in evaluations[0].scores}
+    return {"kept": share, "kept_low": low, "kept_high": high, **scores}
+
+
+def _interval(evaluations: Sequence[Evaluation]) -> tuple[float, float, float]:
+    """Share of rollouts that are kept, and its 95 % interval (Wilson 1927)."""
+    success = np.concatenate([kept(e) for e in evaluations])
+    found = binomtest(int(success.sum()), len(success)).proportion_ci(method="wilson")
+    return float(success.mean()), float(found.low), float(found.high)
+
+
+def _with_interval(evaluations: Sequence[Evaluation]) -> str:
+    share, low, high = (100 * value for value in _interval(evaluations))
+    return f"{share:.1f} ({low:.0f} to {high:.0f})"
+
+
+def _share(evaluations: Sequence[Evaluation], name: str) -> str:
+    if name not in evaluations[0].scores:
+        return ""
+    return f"{100 * np.mean([e.rows()[name] for e in evaluations]):.1f}"
