@@ -17,7 +17,7 @@ from jaxtyping import Array, Float, Int
 from envs.disturbances.episode import delayed, pushing, seen_pose
 from envs.disturbances.randomize import Randomize
 from envs.disturbances.tables import disturbance_tables, disturbed_start
-from envs.disturbances.variation import Variation, draw_variations, varied_models
+from envs.disturbances.variation import draw_variations
 from envs.observation import observe, residual_scale
 from envs.physics import make_engine
 from envs.physics.engine import PhysicsState
@@ -27,6 +27,7 @@ from envs.rewards import TrackedStep, metric_names, weighted_terms
 from envs.scene import NUM_WRIST, OBJECT, demonstration_models
 from envs.task import Task
 from envs.twin import Tables, Twin, twin_of
+from envs.varied_scene import varied_models
 from mjx_hand.errors import InputError
 from mjx_hand.files.array_cache import cached, model_bytes
 from mjx_hand.hand.joints import NUM_HINGES
@@ -82,10 +83,9 @@ class TrackingEnv(Env):
         self.models = demonstration_models(
             demonstrations, hands, gains=gains, assisted=self.assisted or randomize is not None
         )
-        self.variations: list[list[Variation]] = [[Variation()] for _ in self.demonstrations]
+        self.variations = draw_variations(randomize or Randomize.only(), len(self.demonstrations), _VARIATION_SEED)
         scenes = self.models
         if randomize is not None:
-            self.variations = draw_variations(randomize, len(self.demonstrations), _VARIATION_SEED)
             scenes = varied_models(self.demonstrations, self.hands, self.variations, gains)
         self.engine = make_engine(engine, scenes, self.task.substeps)
         self.dt = float(self.models[0].opt.timestep * self.task.substeps)
@@ -104,9 +104,10 @@ class TrackingEnv(Env):
             low=jnp.asarray(low, jnp.float32),
             high=jnp.asarray(high, jnp.float32),
             engine=self.engine.tables,
-            disturbances=None
-            if randomize is None
-            else disturbance_tables(randomize, self.demonstrations, self.variations, reference, starts, self._states),
+            disturbances=randomize
+            and disturbance_tables(
+                randomize, self.demonstrations, self.variations, np.asarray(reference.controls), starts, self._states
+            ),
         )
 
     def with_tables(self, tables: Tables) -> "TrackingEnv":
@@ -166,7 +167,9 @@ class TrackingEnv(Env):
         episode = None
         if (tables := self.tables.disturbances) is not None:
             key = jax.random.fold_in(jax.random.key(0), demonstration) if rng is None else rng
-            frame, physics, episode = disturbed_start(tables, self.reference, demonstration, frame, physics, key)
+            frame, physics, episode = disturbed_start(
+                tables, self.reference.controls, demonstration, frame, physics, key
+            )
         twin = Twin(
             physics=physics,
             demonstration=demonstration,

@@ -2,7 +2,7 @@
 
 from envs.disturbances.episode import Episode, EpisodeTables, draw_episode, episode_tables
 from envs.disturbances.randomize import Randomize
-from envs.disturbances.variation import Variation, draw_variations, varied_model, varied_pose
+from envs.disturbances.variation import Variation, draw_variations, varied_pose
 
 __all__ = [
     "Episode",
@@ -12,6 +12,5 @@ __all__ = [
     "draw_episode",
     "draw_variations",
     "episode_tables",
-    "varied_model",
     "varied_pose",
 ]

@@ -8,7 +8,6 @@ import numpy as np
 from jaxtyping import Array, Float, Int, UInt32
 
 from envs.disturbances.randomize import MOST_DELAY, Randomize
-from envs.reference import Reference
 from mjx_hand.pytree import pytree
 from mjx_hand.rotations import exp, matrix_to_quaternion, quaternion_to_matrix
 
@@ -61,12 +60,13 @@ class Episode:
     key: UInt32[Array, "*b k"]
 
 
-def episode_tables(randomize: Randomize, reference: Reference, fps: float) -> EpisodeTables:
-    """What episodes are drawn from by these ranges, on these demonstrations (frames a second)."""
+def episode_tables(
+    randomize: Randomize, object_pose: Float[np.ndarray, "d t 7"], length: Int[np.ndarray, "d"], fps: float
+) -> EpisodeTables:
+    """What episodes are drawn from by these ranges, on demonstrations of so many frames (`fps` of them a second)."""
     randomize = randomize.scaled()
     steps = round(randomize.push_seconds * fps)
-    length, pose = np.asarray(reference.length), np.asarray(reference.object_pose)
-    away = np.linalg.norm(pose[..., :3] - pose[:, :1, :3], axis=-1) > _HELD_AWAY
+    away = np.linalg.norm(object_pose[..., :3] - object_pose[:, :1, :3], axis=-1) > _HELD_AWAY
     first = np.where(away.any(axis=1), away.argmax(axis=1), _NEVER)
     last = length - 2 - steps  # over before the last frame, which an evaluation holds on
     return EpisodeTables(

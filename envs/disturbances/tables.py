@@ -6,19 +6,14 @@ from collections.abc import Callable, Sequence
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from envs.disturbances.episode import Episode, EpisodeTables, draw_episode, episode_tables
 from envs.disturbances.randomize import Randomize
 from envs.disturbances.variation import Variation, varied_pose
 from envs.physics.engine import PhysicsState
-from envs.reference import Reference
-from envs.scene import NUM_WRIST
-from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.pytree import pytree
-
-_NUM_TARGETS = NUM_WRIST + NUM_HINGES
 
 
 @pytree
@@ -41,7 +36,7 @@ def disturbance_tables(
     randomize: Randomize,
     demonstrations: Sequence[Demonstration],
     variations: Sequence[Sequence[Variation]],
-    reference: Reference,
+    controls: Float[np.ndarray, "d t u"],
     starts: PhysicsState,
     states: Callable[..., PhysicsState],
 ) -> DisturbanceTables:
@@ -51,25 +46,28 @@ def disturbance_tables(
         randomize: the ranges.
         demonstrations: what is tracked.
         variations: of each demonstration.
-        reference: of all.
+        controls: of each demonstration (m, rad).
         starts: the states of each demonstration's frames.
         states: the engine's state for rows of variant, qpos, qvel and the targets' controls.
     """
     each = len(variations[0])
     qpos, qvel = (np.repeat(np.asarray(rows[:, 0]), each, axis=0) for rows in (starts.qpos, starts.qvel))
     every = [(d, variation) for d, own in zip(demonstrations, variations, strict=True) for variation in own]
-    qpos[:, _NUM_TARGETS:] = [varied_pose(d, variation) for d, variation in every]
-    controls = np.repeat(np.asarray(reference.controls[:, 0]), each, axis=0)
+    qpos[:, controls.shape[-1] :] = [varied_pose(d, variation) for d, variation in every]
+    poses = [d.object_pose for d in demonstrations]
+    length = np.array([len(pose) for pose in poses])
+    frames = int(length.max())
+    held_on = np.stack([np.pad(pose, ((0, frames - len(pose)), (0, 0)), mode="edge") for pose in poses])
     return DisturbanceTables(
-        first=states(np.arange(len(every), dtype=np.int32), qpos, qvel, controls),
+        first=states(np.arange(len(every), dtype=np.int32), qpos, qvel, np.repeat(controls[:, 0], each, axis=0)),
         elsewhere=jnp.array([variation.is_elsewhere for _, variation in every]),
-        episode=episode_tables(randomize, reference, demonstrations[0].motion.fps),
+        episode=episode_tables(randomize, held_on, length, demonstrations[0].motion.fps),
     )
 
 
 def disturbed_start(
     tables: DisturbanceTables,
-    reference: Reference,
+    controls: Float[Array, "d t u"],
     demonstration: Int[Array, ""],
     frame: Int[Array, ""],
     physics: PhysicsState,
@@ -77,10 +75,10 @@ def disturbed_start(
 ) -> tuple[Int[Array, ""], PhysicsState, Episode]:
     """A frame, state and episode drawn for one of a demonstration's variations; `physics` is the undisturbed state."""
     which, others = jax.random.split(key)
-    each = tables.elsewhere.shape[0] // reference.length.shape[0]
+    each = tables.elsewhere.shape[0] // controls.shape[0]
     variation = demonstration * each + jax.random.randint(which, (), 0, each)
     frame = jnp.where(tables.elsewhere[variation], 0, frame)
     first = jax.tree.map(lambda table: table[variation], tables.first)
     later = dataclasses.replace(physics, variant=variation)
     physics = jax.tree.map(lambda a, b: jnp.where(frame == 0, a, b), first, later)
-    return frame, physics, draw_episode(tables.episode, demonstration, reference.controls[demonstration, frame], others)
+    return frame, physics, draw_episode(tables.episode, demonstration, controls[demonstration, frame], others)

@@ -1,19 +1,15 @@
 """`Variation`: one scene that differs from its demonstration's in place, mass, friction, size or gains."""
 
 import dataclasses
-from collections.abc import Sequence
 
-import mujoco
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from envs.disturbances.randomize import Randomize
-from envs.scene import SUPPORT, base_rotation, scene_spec
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.objects.description import ObjectDescription
 from mjx_hand.rigid.gains import Gains
-from mjx_hand.rigid.rigid_hand import RigidHand
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,60 +67,8 @@ def varied_pose(demonstration: Demonstration, variation: Variation) -> Float[np.
     return np.concatenate([place, turned.as_quat(scalar_first=True)])
 
 
-def varied_model(
-    demonstration: Demonstration,
-    hand: RigidHand,
-    variation: Variation,
-    gains: Gains,
-    *,
-    spare: int = 0,
-    motors: bool = False,
-) -> mujoco.MjModel:
-    """The scene of a demonstration with a variation.
-
-    Args:
-        demonstration: what is recorded.
-        hand: the twin's.
-        variation: how the scene differs.
-        gains: of the hand as it is meant.
-        spare: boxes to add that touch nothing.
-        motors: six on the object, as `scene_spec` has them.
-    """
-    spec = scene_spec(
-        hand,
-        _varied_object(demonstration.object, variation),
-        demonstration.support,
-        demonstration.support_position,
-        base_rotation(demonstration),
-        gains=_varied_gains(gains, variation.gains),
-        spare=spare,
-        assisted=motors,
-    )
-    centre = demonstration.object_pose[0, :3] * (1, 1, 0)
-    turn = Rotation.from_rotvec([0.0, 0.0, variation.turn])
-    for k, place in enumerate(demonstration.support_position):
-        box = spec.geom(f"{SUPPORT}{k}")
-        box.pos = centre + turn.apply(place - centre) + np.array([*variation.move, 0.0])
-        box.quat = turn.as_quat(scalar_first=True)
-    return spec.compile()
-
-
-def varied_models(
-    demonstrations: Sequence[Demonstration],
-    hands: Sequence[RigidHand],
-    variations: Sequence[Sequence[Variation]],
-    gains: Gains,
-) -> list[mujoco.MjModel]:
-    """The scenes of all, a demonstration's own one after the other, with motors on their objects."""
-    most = max(len(d.support) for d in demonstrations)
-    return [
-        varied_model(d, hand, variation, gains, spare=most - len(d.support), motors=True)
-        for d, hand, own in zip(demonstrations, hands, variations, strict=True)
-        for variation in own
-    ]
-
-
-def _varied_object(description: ObjectDescription, variation: Variation) -> ObjectDescription:
+def varied_object(description: ObjectDescription, variation: Variation) -> ObjectDescription:
+    """The object of a scene with this variation."""
     return dataclasses.replace(
         description,
         size=np.asarray(description.size) * variation.size,
@@ -134,7 +78,7 @@ def _varied_object(description: ObjectDescription, variation: Variation) -> Obje
     )
 
 
-def _varied_gains(gains: Gains, factor: float) -> Gains:
+def varied_gains(gains: Gains, factor: float) -> Gains:
     """Stiffness, damping and limits times a factor; the hinges' damping goes with the root of their stiffness."""
     return dataclasses.replace(
         gains,

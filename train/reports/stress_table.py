@@ -11,7 +11,7 @@ from scipy.stats import binomtest
 
 from envs.evaluation.evaluate import Evaluation
 from mjx_hand.files.npz_archive import replacing
-from mjx_hand.view.figures import plots
+from mjx_hand.view.figures.stress_figure import shares_over
 from mjx_hand.view.report import Table
 from train.experiment.evaluate_seeds import POLICY, PRESS
 from train.experiment.stress import CURVES, Stress, kept
@@ -50,7 +50,7 @@ def stress_figure(stress: Stress) -> Figure:
         PRESS: lambda row: [stress.press[row]],
     }
     panels = {varied: {name: curve(places, of) for name, of in columns.items()} for varied, places in CURVES.items()}
-    return plots.shares_over(panels)
+    return shares_over(panels)
 
 
 def write_stress(stress: Stress, folder: Path) -> None:

@@ -6,10 +6,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from brax.envs.base import State
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from envs.disturbances import Randomize, draw_episode, episode_tables
+from envs.disturbances import Episode, Randomize, draw_episode, episode_tables
 from envs.disturbances.episode import delayed, pushing, seen_pose
 from envs.evaluation.roll_out import make_roll_out, zero_residual
 from envs.scene import OBJECT
@@ -30,7 +31,13 @@ def made(demonstrations, hands):
     return make
 
 
-def starts(env: TrackingEnv, count: int):  # type: ignore[no-untyped-def]
+def episode_of(state: State) -> Episode:
+    episode = twin_of(state).episode
+    assert episode is not None
+    return episode
+
+
+def starts(env: TrackingEnv, count: int) -> State:
     return jax.jit(jax.vmap(env.reset))(jax.random.split(jax.random.key(5), count))
 
 
@@ -57,11 +64,11 @@ def test_objects_elsewhere_start_at_frame_0_and_others_anywhere(made):
     assert (frame[elsewhere] == 0).all()
     assert (frame[~elsewhere] > 0).mean() > 0.5
     assert_array_equal(np.asarray(twin.physics.variant) // 4, np.asarray(twin.demonstration))
-    assert set(np.asarray(twin.episode.delay).tolist()) == {0, 1, 2}
-    pushed = np.linalg.norm(twin.episode.push, axis=-1)
+    assert set(np.asarray(episode_of(state).delay).tolist()) == {0, 1, 2}
+    pushed = np.linalg.norm(episode_of(state).push, axis=-1)
     assert 0.35 < (pushed > 0).mean() < 0.65
     assert 10 < pushed.max() <= 12
-    assert len(np.unique(np.asarray(twin.episode.seen_offset), axis=0)) == 400
+    assert len(np.unique(np.asarray(episode_of(state).seen_offset), axis=0)) == 400
 
 
 def test_late_targets_arrive_in_order(made):
@@ -102,7 +109,7 @@ def test_a_push_moves_a_free_object_as_newton_says(made):
     pose = np.array(twin.physics.qpos)
     pose[26 + 2] += 0.5  # in the air, with nothing near
     physics = env.engine.reset(twin.physics.variant, jnp.asarray(pose), jnp.zeros(32), jnp.zeros(32))
-    episode = dataclasses.replace(twin.episode, push=jnp.array([6.0, -8.0, 0.0]), push_start=jnp.asarray(0))
+    episode = dataclasses.replace(episode_of(state), push=jnp.array([6.0, -8.0, 0.0]), push_start=jnp.asarray(0))
     twin = dataclasses.replace(twin, physics=physics, episode=episode)
     after = twin_of(jax.jit(env.step)(state.replace(pipeline_state=twin), jnp.zeros(26)))
     mass = float(env.engine.models[0].body(OBJECT).mass[0])
@@ -117,7 +124,7 @@ def test_the_pose_is_seen_off_by_what_is_asked_and_is_not_changed(env, made):
     tables = seen.tables.disturbances
     assert tables is not None
     pose = twin_of(other).physics.qpos[26:]
-    found = np.asarray(seen_pose(twin_of(other).episode, tables.episode, jnp.asarray(3), pose))
+    found = np.asarray(seen_pose(episode_of(other), tables.episode, jnp.asarray(3), pose))
     assert np.linalg.norm(found[:3] - pose[:3]) == pytest.approx(0.01, rel=1e-4)
     before, after = (Rotation.from_quat(np.asarray(q), scalar_first=True) for q in (pose[3:], found[3:]))
     assert np.rad2deg((after * before.inv()).magnitude()) == pytest.approx(5.0, rel=1e-3)
@@ -128,7 +135,7 @@ def test_noise_is_as_wide_as_asked_and_new_in_every_step(made):
     env = made(Randomize.only(seen_noise=0.002, seen_noise_deg=1.0))
     tables = env.tables.disturbances
     assert tables is not None
-    episode, pose = twin_of(jax.jit(env.start)(0, 0)).episode, jnp.array([0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0])
+    episode, pose = episode_of(jax.jit(env.start)(0, 0)), jnp.array([0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0])
     seen = np.asarray(jax.vmap(lambda f: seen_pose(episode, tables.episode, f, pose))(jnp.arange(3000)))
     assert seen[:, :3].std(axis=0) == pytest.approx([0.002] * 3, rel=0.06)
     assert np.rad2deg(2 * seen[:, 4:]).std(axis=0) == pytest.approx([1.0] * 3, rel=0.06)
@@ -166,8 +173,8 @@ def test_ranges_that_cannot_be_are_refused(given, said):
 def test_a_demonstration_that_is_never_held_is_never_pushed(env):
     frames = env.num_frames
     still = jnp.repeat(env.reference.object_pose[:, :1], frames, axis=1)
-    reference = dataclasses.replace(env.reference, object_pose=still)
-    tables = episode_tables(Randomize.only(push=(5.0, 5.0)), reference, env.fps)
+    length = np.asarray(env.reference.length)
+    tables = episode_tables(Randomize.only(push=(5.0, 5.0)), np.asarray(still), length, env.fps)
     for key in jax.random.split(jax.random.key(0), 5):
         episode = draw_episode(tables, jnp.asarray(0), jnp.zeros(26), key)
         assert not np.any(jax.vmap(lambda f, e=episode: pushing(e, tables, f))(jnp.arange(frames)))

@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -10,8 +11,9 @@ import trimesh
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from envs.disturbances import Randomize, Variation, draw_variations, varied_model, varied_pose
+from envs.disturbances import Randomize, Variation, draw_variations, varied_pose
 from envs.scene import OBJECT, SUPPORT
+from envs.varied_scene import varied_model
 from mjx_hand.objects.description import OBJECT_KINDS, ObjectDescription
 from mjx_hand.rigid.gains import Gains
 
@@ -24,7 +26,7 @@ def matrix(quaternion: np.ndarray) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def model(demonstrations, hands):
-    def compiled(**given: object) -> mujoco.MjModel:
+    def compiled(**given: Any) -> mujoco.MjModel:
         return varied_model(demonstrations[0], hands[0], Variation(**given), Gains(), motors=True)
 
     return compiled

@@ -1,0 +1,66 @@
+"""Scenes with variations: the object's place, mass, friction and size, and the hand's gains, other than recorded."""
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from envs.disturbances.variation import Variation, varied_gains, varied_object
+from envs.scene import SUPPORT, base_rotation, scene_spec
+from mjx_hand.motion.demonstration import Demonstration
+from mjx_hand.rigid.gains import Gains
+from mjx_hand.rigid.rigid_hand import RigidHand
+
+
+def varied_model(
+    demonstration: Demonstration,
+    hand: RigidHand,
+    variation: Variation,
+    gains: Gains,
+    *,
+    spare: int = 0,
+    motors: bool = False,
+) -> mujoco.MjModel:
+    """The scene of a demonstration with a variation.
+
+    Args:
+        demonstration: what is recorded.
+        hand: the twin's.
+        variation: how the scene differs.
+        gains: of the hand as it is meant.
+        spare: boxes to add that touch nothing.
+        motors: six on the object, as `scene_spec` has them.
+    """
+    spec = scene_spec(
+        hand,
+        varied_object(demonstration.object, variation),
+        demonstration.support,
+        demonstration.support_position,
+        base_rotation(demonstration),
+        gains=varied_gains(gains, variation.gains),
+        spare=spare,
+        assisted=motors,
+    )
+    centre = demonstration.object_pose[0, :3] * (1, 1, 0)
+    turn = Rotation.from_rotvec([0.0, 0.0, variation.turn])
+    for k, place in enumerate(demonstration.support_position):
+        box = spec.geom(f"{SUPPORT}{k}")
+        box.pos = centre + turn.apply(place - centre) + np.array([*variation.move, 0.0])
+        box.quat = turn.as_quat(scalar_first=True)
+    return spec.compile()
+
+
+def varied_models(
+    demonstrations: Sequence[Demonstration],
+    hands: Sequence[RigidHand],
+    variations: Sequence[Sequence[Variation]],
+    gains: Gains,
+) -> list[mujoco.MjModel]:
+    """The scenes of all, a demonstration's own one after the other, with motors on their objects."""
+    most = max(len(d.support) for d in demonstrations)
+    return [
+        varied_model(d, hand, variation, gains, spare=most - len(d.support), motors=True)
+        for d, hand, own in zip(demonstrations, hands, variations, strict=True)
+        for variation in own
+    ]
