@@ -48,7 +48,11 @@ def varied_model(
         box = spec.geom(f"{SUPPORT}{k}")
         box.pos = centre + turn.apply(place - centre) + np.array([*variation.move, 0.0])
         box.quat = turn.as_quat(scalar_first=True)
-    return spec.compile()
+    model = spec.compile()
+    # A short cut of MuJoCo's for what is not turned; engines that compile it in need the same of every scene.
+    boxes = [model.geom(f"{SUPPORT}{k}").id for k in range(len(demonstration.support))]
+    model.geom_sameframe[boxes] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
+    return model
 
 
 def varied_models(
