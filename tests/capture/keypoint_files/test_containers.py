@@ -53,6 +53,8 @@ def test_a_refusal_says_what_is_there(tmp_path):
     for name, shape in (("lone", (0, 21, 3)), ("flat", (0, 63))):
         np.save(tmp_path / f"{name}.npy", np.zeros(shape))
         assert "the recording has no frames" in refused(f"{name}.npy")
+    (tmp_path / "header.csv").write_text(lines(["t", *AXES], []))
+    assert "the recording has no frames" in refused("header.csv")
     (tmp_path / "angles.csv").write_text("time,j_thumb_fle,j_index_fle\n0,1,2\n0.1,1,2\n")
     assert "a table of 2 rows and the columns time, j_thumb_fle, j_index_fle" in refused("angles.csv")
 
