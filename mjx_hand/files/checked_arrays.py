@@ -27,11 +27,12 @@ def numbers(
     Args:
         path: for the messages.
         arrays: what the file holds.
-        layout: each array's shape; a letter stands for one length, the same wherever it occurs.
+        layout: each array's shape; a letter stands for one length, the same wherever it occurs. "t" counts frames, of
+            which there must be one.
         finite: refuse NaN and infinity too.
 
     Raises:
-        InputError: an array is missing, is not numeric, or has another shape or, if asked for, NaN.
+        InputError: an array is missing, is not numeric, or has another shape, no frames or, if asked for, NaN.
     """
     sizes: dict[str, int] = {}
     found = {}
@@ -49,6 +50,8 @@ def numbers(
             expected = ", ".join(map(str, known))
             raise InputError(f"{path}: {name} has shape {value.shape}, expected ({expected})")
         sizes |= {d: n for d, n in zip(wanted, value.shape, strict=True) if isinstance(d, str)}
+        if sizes.get("t") == 0:
+            raise InputError(f"{path}: the recording has no frames ({name} has shape {value.shape}); save at least one")
         if value.dtype.kind == "f" and value.dtype.itemsize > 8:
             value = value.astype(float)  # long doubles, which nothing here computes with
         if finite and not np.isfinite(value).all():

@@ -39,11 +39,11 @@ class Table:
         """The cells of every row.
 
         Raises:
-            InputError: a row has more or fewer than the header.
+            InputError: a row has more or fewer than the header, or a cell in quotation marks has no end.
         """
         found = []
         for k, line in enumerate(self.lines):
-            cells = _cells(line, self.separator)
+            cells = _cells(self.path, line, self.separator)
             while len(cells) > len(self.columns) and not cells[-1]:
                 cells.pop()
             if len(cells) != len(self.columns):
@@ -89,7 +89,7 @@ def read_table(path: Path) -> Table:
     """A table whose first line that is neither empty nor a comment names the columns.
 
     Raises:
-        InputError: it is no text.
+        InputError: it is no text, or a cell in quotation marks has no end.
     """
     said: dict[str, str] = {}
     lines = [line for line in read_lines(path) if line.strip()]
@@ -97,12 +97,15 @@ def read_table(path: Path) -> Table:
         if not line.startswith("#"):
             counts = {each: line.count(each) for each in _SEPARATORS}
             separator = max(_SEPARATORS, key=lambda each: counts[each])
-            return Table(path, said, tuple(_cells(line, separator)), tuple(lines[k + 1 :]), separator)
+            return Table(path, said, tuple(_cells(path, line, separator)), tuple(lines[k + 1 :]), separator)
         key, _, value = line.lstrip("# ").partition(":")
         said[key.strip().lower()] = value.strip()
     return Table(path, said, (), (), ",")
 
 
-def _cells(line: str, separator: str) -> list[str]:
-    cells = next(csv.reader([line], delimiter=separator)) if '"' in line else line.split(separator)
+def _cells(path: Path, line: str, separator: str) -> list[str]:
+    try:
+        cells = next(csv.reader([line], delimiter=separator)) if '"' in line else line.split(separator)
+    except csv.Error as error:  # as of a mark that was never closed, with the rest of a long line behind it
+        raise InputError(f"{path}: {line[:_SHOWN]!r}… is no row of a table ({error}); export it again") from None
     return [cell.strip() for cell in cells]

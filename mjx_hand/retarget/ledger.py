@@ -77,15 +77,14 @@ def _understood(line: str) -> dict[str, Any] | None:
     """The entry in a line; None where a kill has torn it, or someone else has written it."""
     try:
         entry = json.loads(line)
-        row = Outcome(**entry["row"])
+        row, key, output = vars(Outcome(**entry["row"])), entry["key"], entry["output"]
     except (ValueError, TypeError, KeyError, RecursionError):
         return None
-    kinds = {name: type(value) for name, value in dataclasses.asdict(Outcome("", "")).items()}
-    sound = all(
-        isinstance(value, int | float if kinds[name] is float else kinds[name])
-        for name, value in dataclasses.asdict(row).items()
-    )
-    return entry if sound else None
+    # Nothing but what `add` writes, so that no depth of lists comes out that could not be written again.
+    kinds = {name: type(value) for name, value in vars(Outcome("", "")).items()}
+    sound = all(isinstance(value, int | float if kinds[name] is float else kinds[name]) for name, value in row.items())
+    stamped = isinstance(output, list) and all(isinstance(number, int) for number in output)
+    return {"row": row, "key": key, "output": output} if sound and stamped and isinstance(key, str) else None
 
 
 def _stamp(path: Path) -> list[int] | None:

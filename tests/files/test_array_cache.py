@@ -38,6 +38,16 @@ def test_found_again_exactly(folder):
         np.testing.assert_array_equal(first[name], second[name])
 
 
+def test_what_a_kill_left_of_them_goes(folder):
+    cached(Counted())
+    (path,) = folder.iterdir()
+    path.unlink()
+    (folder / f".{path.name}-abcdefgh").mkdir()
+    (folder / f".{path.name}-abcdefgh" / path.name).write_bytes(b"half a file")
+    cached(Counted())
+    assert list(folder.iterdir()) == [path]
+
+
 @pytest.mark.parametrize(
     "other",
     [("y", 3, np.arange(4.0)), ("x", 3.0, np.arange(4.0)), ("x", 3, np.arange(4)), ("x", 3, np.arange(4.0)[::-1])],

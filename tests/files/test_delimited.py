@@ -37,5 +37,10 @@ def test_what_is_no_table_of_numbers(tmp_path):
     found = table(tmp_path, "a,b\n1,two\n")
     with pytest.raises(InputError, match="frame 0 has 'two' where a number is expected"):
         found.numbers(found.rows(), [1])
+    endless = '"' + "x" * 200_000
+    with pytest.raises(InputError, match="no row of a table"):
+        table(tmp_path, f"a,{endless}\n1,2\n")
+    with pytest.raises(InputError, match="no row of a table"):
+        table(tmp_path, f"a,b\n1,{endless}\n").rows()
     assert table(tmp_path, "a,b,a\n").repeated() == ["a"]
     assert table(tmp_path, "\n").columns == ()

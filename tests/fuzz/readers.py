@@ -60,7 +60,8 @@ def _robot_motion(path: Path, choice: Choice) -> None:
 
 def _robot(path: Path, choice: Choice) -> None:
     tree, _ = robot_objective(load_robot(path.parent / "robot.yaml"), path)
-    _finite(tree.lower, tree.upper)
+    _finite(tree.rest_rotation, tree.rest_position)
+    assert (tree.lower <= tree.upper).all()  # infinite where a joint turns on and on
 
 
 def _state(path: Path, choice: Choice) -> None:

@@ -57,11 +57,17 @@ def make(valid: list[Valid], number: int, folder: Path) -> tuple[Valid, str, Pat
     """The mutant of that number: what it is one of, the reader whose turn it is, and what to open."""
     rng = np.random.default_rng(number)
     case = valid[number % len(valid)]
-    shutil.rmtree(folder, ignore_errors=True)
-    shutil.copytree(case.root, folder)
+    opened = _copy(case, folder)
     path = folder / case.changed
     path.write_bytes(mutant(rng, case.changed, path.read_bytes()))
-    return case, case.readers[number // len(valid) % len(case.readers)], folder / case.opened
+    return case, case.readers[number // len(valid) % len(case.readers)], opened
+
+
+def _copy(case: Valid, folder: Path) -> Path:
+    """What to open of a copy: some readers write what they have read anew."""
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(case.root, folder)
+    return folder / case.opened
 
 
 def read(case: Valid, reader: str, path: Path) -> tuple[str, str]:
@@ -85,7 +91,7 @@ def main(folder: Path) -> None:
     sys.set_int_max_str_digits(4300)  # as every Python starts
     valid = write_valid(folder / "valid")
     as_they_are = [
-        (case, reader, *read(case, reader, case.root / case.opened)) for case in valid for reader in case.readers
+        (case, reader, *read(case, reader, _copy(case, folder / "mutant"))) for case in valid for reader in case.readers
     ]
     wrong = [
         f"{case.format} {reader}: {outcome} {text}" for case, reader, outcome, text in as_they_are if outcome != "read"

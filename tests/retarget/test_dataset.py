@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -180,8 +181,18 @@ def test_the_key_tells_folders_files_and_settings_apart(folder):
 
 
 def test_a_ledger_of_something_else_is_overlooked(tmp_path):
-    (tmp_path / NAME).write_text('[]\n{"row": 3}\nnot json\n')
+    row = {"file": "a.npz", "status": "done", "frames": 3}
+    sound = {"row": row, "key": "k", "output": [1, 2]}
+    deep: Any = []
+    for _ in range(600):
+        deep = [deep]
+    others = ({"row": row | {"frames": deep}}, {"key": deep}, {"output": deep}, {"output": None})
+    lines = [json.dumps(sound | other) for other in others]
+    (tmp_path / NAME).write_text("\n".join(["[]", '{"row": 3}', "not json", *lines, ""]))
     assert not Ledger(tmp_path).knows("a.npz")
+    (tmp_path / NAME).write_text(json.dumps(sound | {"more": deep}) + "\n")
+    assert Ledger(tmp_path).knows("a.npz")
+    assert json.loads((tmp_path / NAME).read_text())["key"] == "k"
 
 
 RUN = """

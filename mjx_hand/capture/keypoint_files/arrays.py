@@ -82,6 +82,9 @@ def _read(path: Path, arrays: Any, unit: str | None) -> dict[str, KeypointRecord
     for name, side in _points_in(arrays).items():
         array = _array(arrays[name])
         assert array is not None, "as recognised"
+        if not len(array):
+            what = name or "its array"
+            raise InputError(f"{path}: the recording has no frames ({what} has shape {array.shape}); save at least one")
         rows = len(array) if array.ndim == 3 or array.shape[1] != 3 else 1
         points = array.reshape(rows, -1, 3).astype(float)
         points = np.where(np.isfinite(points), points, np.nan) * factor

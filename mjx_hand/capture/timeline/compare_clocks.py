@@ -59,9 +59,11 @@ def timeline_of(
         numbers: of the frames that the rows are.
 
     Raises:
-        InputError: stamps are not finite, not in order, contradict each other, or leave gaps many times longer than
-            the recording.
+        InputError: there are no rows, or stamps are not finite, not in order, contradict each other, or leave gaps
+            many times longer than the recording.
     """
+    if not rows:
+        raise InputError(f"{path}: the recording has no frames; save at least one")
     if rate is not None and not (np.isfinite(rate) and rate > 0):
         raise InputError(f"{path}: fps is {rate}, expected a positive number")
     times, numbers = _told(path, times, name), _told(path, numbers, "frame number")

@@ -50,6 +50,11 @@ def test_a_refusal_says_what_is_there(tmp_path):
     assert "world_coord (joints.right (30, 21, 3)), params (rot_r (30, 3))" in refused("nested.npy")
     np.savez(tmp_path / "beside.npz", joints=HAND, box_poses=np.zeros((30, 4, 4)))
     assert "joints (30, 21, 3), box_poses (30, 4, 4)" in refused("beside.npz")
+    for name, shape in (("lone", (0, 21, 3)), ("flat", (0, 63))):
+        np.save(tmp_path / f"{name}.npy", np.zeros(shape))
+        assert "the recording has no frames" in refused(f"{name}.npy")
+    (tmp_path / "header.csv").write_text(lines(["t", *AXES], []))
+    assert "the recording has no frames" in refused("header.csv")
     (tmp_path / "angles.csv").write_text("time,j_thumb_fle,j_index_fle\n0,1,2\n0.1,1,2\n")
     assert "a table of 2 rows and the columns time, j_thumb_fle, j_index_fle" in refused("angles.csv")
 

@@ -21,6 +21,8 @@ ARGUMENTS = ["config=pinch", "data.people=2", "data.heldout_people=1", "data.tri
 
 
 def test_a_set_is_shown(set_path, set_root, capsys):
+    killed = set_path / ".sheet.png-abcdefgh"
+    killed.mkdir()
     main([*ARGUMENTS, f"demonstrations={set_root}"])
     said = capsys.readouterr().out
     tallies = json.loads((set_path / YIELD).read_text())
@@ -28,6 +30,7 @@ def test_a_set_is_shown(set_path, set_root, capsys):
     assert ["attempts", *(str(sum(tallies[part].values())) for part in PARTS)] in cells
     for words in ("attempts", "held", "hinges from the truth", str(set_path / "sheet.png")):
         assert words in said
+    assert not killed.exists()
     picture = np.asarray(Image.open(set_path / "sheet.png"), float)
     assert picture.shape == (2 * 240, 6 * 240, 3)
     frames = picture.reshape(2, 240, 6, 240, 3)
