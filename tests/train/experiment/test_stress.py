@@ -88,8 +88,8 @@ def test_intervals_are_wilsons():
     figure = stress_figure(found)
     assert [axes.get_xlabel() for axes in figure.axes] == ["moved (mm)"]
     policy, press = figure.axes[0].lines
-    np.testing.assert_allclose(policy.get_xydata(), [[0, 80], [40, 80]])
-    np.testing.assert_allclose(press.get_xydata(), [[0, 0], [40, 0]])
+    np.testing.assert_allclose(np.asarray(policy.get_xydata()), [[0, 80], [40, 80]])
+    np.testing.assert_allclose(np.asarray(press.get_xydata()), [[0, 0], [40, 0]])
 
 
 def test_options_reach_the_ranges():
