@@ -77,7 +77,7 @@ LAUGH = "a: &a [x,x,x,x,x,x,x,x,x]\n" + "".join(
     ],
 )
 def test_what_is_not_plain_is_one_short_line_at_once(text, tmp_path):
-    began = time.perf_counter()
+    began = time.process_time()
     (tmp_path / "x.yaml").write_text(text)
     for read in (lambda: parse_yaml(text, "x.yaml"), lambda: read_yaml(tmp_path / "x.yaml")):
         with pytest.raises(InputError) as caught:
@@ -86,7 +86,7 @@ def test_what_is_not_plain_is_one_short_line_at_once(text, tmp_path):
         assert "x.yaml: " in message
         assert "\n" not in message
         assert len(message) < 300
-    assert time.perf_counter() - began < 2.0
+    assert time.process_time() - began < 2.0
 
 
 def test_files_that_are_no_text_are_refused(tmp_path):

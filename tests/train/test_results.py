@@ -252,7 +252,7 @@ def test_one_experiment_that_is_done_is_shown_while_others_wait(work: list[str],
 
 
 def test_ctrl_c_ends_in_one_line(work: list[str], monkeypatch, capsys):
-    def stop(config: Config, part: str) -> None:
+    def stop(config: Config) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(experiments, "training_env", stop)
