@@ -136,7 +136,7 @@ def base_rotation(demonstration: Demonstration) -> Float[np.ndarray, "3 3"]:
     return Rotation.from_quat(demonstration.motion.wrist_quaternion[first], scalar_first=True).as_matrix()
 
 
-def demonstration_model(
+def demonstration_spec(
     demonstration: Demonstration,
     hand: RigidHand,
     *,
@@ -144,7 +144,7 @@ def demonstration_model(
     visual: bool = False,
     spare: int = 0,
     assisted: bool = False,
-) -> mujoco.MjModel:
+) -> mujoco.MjSpec:
     """The scene that a demonstration takes place in; arguments as of `scene_spec`."""
     return scene_spec(
         hand,
@@ -156,7 +156,27 @@ def demonstration_model(
         visual=visual,
         spare=spare,
         assisted=assisted,
-    ).compile()
+    )
+
+
+def demonstration_model(
+    demonstration: Demonstration,
+    hand: RigidHand,
+    *,
+    gains: Gains | None = None,
+    visual: bool = False,
+    spare: int = 0,
+    assisted: bool = False,
+) -> mujoco.MjModel:
+    """`demonstration_spec`, compiled."""
+    spec = demonstration_spec(demonstration, hand, gains=gains, visual=visual, spare=spare, assisted=assisted)
+    return spec.compile()
+
+
+def spare_boxes(demonstrations: Sequence[Demonstration]) -> list[int]:
+    """How many boxes each scene of a set lacks to have as many as the one with most."""
+    most = max(len(d.support) for d in demonstrations)
+    return [most - len(d.support) for d in demonstrations]
 
 
 def demonstration_models(
@@ -171,10 +191,9 @@ def demonstration_models(
     An engine's models have equally many geoms: scenes whose supports have fewer boxes than others get spare ones, which
     touch nothing.
     """
-    most = max(len(d.support) for d in demonstrations)
     return [
-        demonstration_model(d, hand, gains=gains, spare=most - len(d.support), assisted=assisted)
-        for d, hand in zip(demonstrations, hands, strict=True)
+        demonstration_model(d, hand, gains=gains, spare=spare, assisted=assisted)
+        for d, hand, spare in zip(demonstrations, hands, spare_boxes(demonstrations), strict=True)
     ]
 
 

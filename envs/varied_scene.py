@@ -1,5 +1,6 @@
 """Scenes with variations: the object's place, mass, friction and size, and the hand's gains, other than recorded."""
 
+import dataclasses
 from collections.abc import Sequence
 
 import mujoco
@@ -7,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from envs.disturbances.variation import Variation, varied_gains, varied_object
-from envs.scene import SUPPORT, base_rotation, scene_spec
+from envs.scene import SUPPORT, demonstration_spec, spare_boxes
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand
@@ -32,16 +33,8 @@ def varied_model(
         spare: boxes to add that touch nothing.
         motors: six on the object, as `scene_spec` has them.
     """
-    spec = scene_spec(
-        hand,
-        varied_object(demonstration.object, variation),
-        demonstration.support,
-        demonstration.support_position,
-        base_rotation(demonstration),
-        gains=varied_gains(gains, variation.gains),
-        spare=spare,
-        assisted=motors,
-    )
+    varied = dataclasses.replace(demonstration, object=varied_object(demonstration.object, variation))
+    spec = demonstration_spec(varied, hand, gains=varied_gains(gains, variation.gains), spare=spare, assisted=motors)
     centre = demonstration.object_pose[0, :3] * (1, 1, 0)
     turn = Rotation.from_rotvec([0.0, 0.0, variation.turn])
     for k, place in enumerate(demonstration.support_position):
@@ -62,9 +55,8 @@ def varied_models(
     gains: Gains,
 ) -> list[mujoco.MjModel]:
     """The scenes of all, a demonstration's own one after the other, with motors on their objects."""
-    most = max(len(d.support) for d in demonstrations)
     return [
-        varied_model(d, hand, variation, gains, spare=most - len(d.support), motors=True)
-        for d, hand, own in zip(demonstrations, hands, variations, strict=True)
+        varied_model(d, hand, variation, gains, spare=spare, motors=True)
+        for d, hand, own, spare in zip(demonstrations, hands, variations, spare_boxes(demonstrations), strict=True)
         for variation in own
     ]

@@ -31,7 +31,7 @@ from mjx_hand.cli.output import print_table
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError, reason_of
 from mjx_hand.files.npz_archive import replacing
-from mjx_hand.files.working_folder import working_folder
+from mjx_hand.files.working_folder import working_file
 from mjx_hand.progress import shares
 from mjx_hand.view.video.renderer import RendererUnavailable
 
@@ -97,10 +97,9 @@ def _make_and_show(settings: SetSettings, root: Path) -> None:
         print(f"no picture: {error}")
     else:
         path = folder / "sheet.png"
-        with working_folder(path) as temporary:  # which goes with the next start, where a kill leaves it
-            with replacing(temporary / path.name) as file:
-                Image.fromarray(np.asarray(sheet)).save(file, format="png")
-            (temporary / path.name).replace(path)
+        # The working file goes with the next start, where a kill leaves it.
+        with working_file(path) as temporary, replacing(temporary) as file:
+            Image.fromarray(np.asarray(sheet)).save(file, format="png")
         print(f"picture: {path}")
 
 

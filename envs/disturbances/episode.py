@@ -1,6 +1,7 @@
 """`Episode`: what is disturbed for one episode without another scene: pushes, delays, and how the object is seen."""
 
 import dataclasses
+from collections.abc import Sequence
 
 import jax
 import jax.numpy as jnp
@@ -60,15 +61,10 @@ class Episode:
     key: UInt32[Array, "*b k"]
 
 
-def episode_tables(
-    randomize: Randomize, object_pose: Float[np.ndarray, "d t 7"], length: Int[np.ndarray, "d"], fps: float
-) -> EpisodeTables:
-    """What episodes are drawn from by these ranges, on demonstrations of so many frames (`fps` of them a second)."""
+def episode_tables(randomize: Randomize, object_poses: Sequence[Float[np.ndarray, "_ 7"]], fps: float) -> EpisodeTables:
+    """What episodes are drawn from by these ranges, on demonstrations with these poses (`fps` a second)."""
     randomize = randomize.scaled()
     steps = round(randomize.push_seconds * fps)
-    away = np.linalg.norm(object_pose[..., :3] - object_pose[:, :1, :3], axis=-1) > _HELD_AWAY
-    first = np.where(away.any(axis=1), away.argmax(axis=1), _NEVER)
-    last = length - 2 - steps  # over before the last frame, which an evaluation holds on
     return EpisodeTables(
         delay=jnp.array(randomize.delay, jnp.int32),
         seen_move=jnp.array(randomize.seen_move, jnp.float32),
@@ -77,8 +73,15 @@ def episode_tables(
         push=jnp.array(randomize.push, jnp.float32),
         push_steps=jnp.asarray(steps, jnp.int32),
         push_prob=jnp.asarray(randomize.push_prob, jnp.float32),
-        held=jnp.array(np.stack([first, np.maximum(last, first)], axis=1), jnp.int32),
+        held=jnp.array([_held(pose, steps) for pose in object_poses], jnp.int32),
     )
+
+
+def _held(pose: Float[np.ndarray, "_ 7"], steps: int) -> tuple[int, int]:
+    """The first and the last frame of a demonstration from which a push of so many steps finds the object held."""
+    away = np.linalg.norm(pose[:, :3] - pose[0, :3], axis=1) > _HELD_AWAY
+    first = int(away.argmax()) if away.any() else _NEVER
+    return first, max(len(pose) - 2 - steps, first)  # over before the last frame, which an evaluation holds on
 
 
 def draw_episode(
@@ -86,9 +89,9 @@ def draw_episode(
 ) -> Episode:
     """An episode of a demonstration; `control` (m, rad) is what the actuators were told so far."""
     keys = jax.random.split(key, 10)
+    ranges = (tables.seen_move, tables.seen_turn, tables.push)
     distance, angle, force = (
-        jax.random.uniform(k, minval=limits[0], maxval=limits[1])
-        for k, limits in zip(keys, (tables.seen_move, tables.seen_turn, tables.push), strict=False)
+        jax.random.uniform(k, minval=limits[0], maxval=limits[1]) for k, limits in zip(keys[:3], ranges, strict=True)
     )
     offset = jnp.concatenate([distance * _direction(keys[3], 3), angle * _direction(keys[4], 3)])
     pushed = jax.random.bernoulli(keys[5], tables.push_prob)

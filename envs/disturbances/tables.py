@@ -54,14 +54,10 @@ def disturbance_tables(
     qpos, qvel = (np.repeat(np.asarray(rows[:, 0]), each, axis=0) for rows in (starts.qpos, starts.qvel))
     every = [(d, variation) for d, own in zip(demonstrations, variations, strict=True) for variation in own]
     qpos[:, controls.shape[-1] :] = [varied_pose(d, variation) for d, variation in every]
-    poses = [d.object_pose for d in demonstrations]
-    length = np.array([len(pose) for pose in poses])
-    frames = int(length.max())
-    held_on = np.stack([np.pad(pose, ((0, frames - len(pose)), (0, 0)), mode="edge") for pose in poses])
     return DisturbanceTables(
         first=states(np.arange(len(every), dtype=np.int32), qpos, qvel, np.repeat(controls[:, 0], each, axis=0)),
         elsewhere=jnp.array([variation.is_elsewhere for _, variation in every]),
-        episode=episode_tables(randomize, held_on, length, demonstrations[0].motion.fps),
+        episode=episode_tables(randomize, [d.object_pose for d in demonstrations], demonstrations[0].motion.fps),
     )
 
 

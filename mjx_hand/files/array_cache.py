@@ -15,7 +15,7 @@ import numpy as np
 
 from mjx_hand.errors import InputError
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
-from mjx_hand.files.working_folder import working_folder
+from mjx_hand.files.working_folder import working_file
 
 SCHEMA = "mjx-hand/kept/1"
 _FOLDER = "arrays"
@@ -50,9 +50,8 @@ def cached(compute: Callable[[], Mapping[str, np.ndarray]], *ingredients: Any) -
                 os.utime(path)
             return arrays
     arrays = compute()
-    with working_folder(path) as folder:  # which goes with the next start, where a kill leaves it
-        save_arrays(folder / path.name, SCHEMA, arrays)
-        (folder / path.name).replace(path)
+    with working_file(path) as temporary:  # which goes with the next start, where a kill leaves it
+        save_arrays(temporary, SCHEMA, arrays)
     with contextlib.suppress(FileNotFoundError):  # another process tidies up too
         for old in sorted(path.parent.glob("[!.]*.npz"), key=lambda file: file.stat().st_mtime)[:-_MOST]:
             old.unlink()

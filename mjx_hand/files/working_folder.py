@@ -38,6 +38,18 @@ def working_folder(final: Path) -> Iterator[Path]:
             os.close(lock)
 
 
+@contextlib.contextmanager
+def working_file(final: Path) -> Iterator[Path]:
+    """Yield a path to write in a working folder; on success the file takes `final`'s place.
+
+    Raises:
+        InputError: as `working_folder`.
+    """
+    with working_folder(final) as folder:
+        yield folder / final.name
+        (folder / final.name).replace(final)
+
+
 def remove_abandoned(final: Path) -> None:
     """Delete the working folders of `final` whose processes were killed."""
     if not _LOCKS:

@@ -93,13 +93,14 @@ def stress(configs: Sequence[Config], part: str = "heldout") -> Stress:
     presses: dict[str, Evaluation] = {}
     with counter(len(ROWS) + 1, "under disturbances (rows)") as advance:
         press = constant_press(recorded)
-        known = [search_press(env, HOLD) for env in (load_env(first, "train"), training_env(first))]
+        searched = [load_env(first, "train"), *([training_env(first)] if first.randomize.share else [])]
+        known = [search_press(env, HOLD) for env in searched]
         pressed = [press.tables(strengths).reference for strengths in known]
         advance(1)
         # Compiled once: the rows' environments differ in their tables alone.
         learned, zero = (make_roll_out(recorded, act, HOLD) for act in (policy, zero_residual))
         for row, randomize in ROWS.items():
-            tables = load_env(first, part, randomize).tables
+            tables = (recorded if row == RECORDED else load_env(first, part, randomize)).tables
             policies[row] = {
                 seed: evaluate(learned(checkpoint.policy, tables), objects) for seed, checkpoint in checkpoints.items()
             }

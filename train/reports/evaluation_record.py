@@ -4,7 +4,7 @@ import csv
 import dataclasses
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -43,15 +43,18 @@ def write_results(results: Mapping[int, Results], configs: Sequence[Config], fil
         "engine": first.env.engine.name,
         "checkpoint_steps": {seed: result.checkpoint.steps for seed, result in results.items()},
         "demonstrations": len(first.env.demonstrations),
-        "scores": {POLICY: _mean([e.rows() for e in policies.values()]), **{t: e.rows() for t, e in baselines.items()}},
+        "scores": {
+            POLICY: mean_scores([e.rows() for e in policies.values()]),
+            **{t: e.rows() for t, e in baselines.items()},
+        },
         "types": {
-            POLICY: {grasp: _mean([scores[grasp] for scores in by_type]) for grasp in by_type[0]},
+            POLICY: {grasp: mean_scores([scores[grasp] for scores in by_type]) for grasp in by_type[0]},
             **{title: type_scores(e, grasps) for title, e in baselines.items()},
         },
         "constant_press": dict(first.press),
         "seeds": {seed: e.rows() for seed, e in policies.items()},
         "failures": {
-            POLICY: _mean([e.failure_shares() for e in policies.values()]),
+            POLICY: mean_scores([e.failure_shares() for e in policies.values()]),
             **{title: e.failure_shares() for title, e in baselines.items()},
         },
         "failed": [failed for seed, e in policies.items() for failed in _failed(seed, e)],
@@ -66,9 +69,15 @@ def write_results(results: Mapping[int, Results], configs: Sequence[Config], fil
         rows.writerow(["column", "seed", "demonstration", *names, "failure"])
         every = [(POLICY, seed, e) for seed, e in policies.items()] + [(t, "", e) for t, e in baselines.items()]
         for title, seed, e in every:
-            for k, demonstration in enumerate(e.demonstration):
-                rows.writerow([title, seed, int(demonstration), *(f"{e.scores[n][k]:g}" for n in names), e.failure[k]])
+            rows.writerows([title, seed, *row] for row in rollout_rows(e, names))
     return out
+
+
+def rollout_rows(evaluation: Evaluation, names: Sequence[str]) -> Iterator[list[Any]]:
+    """A row a rollout: its demonstration, the scores of these names, and why it failed."""
+    for k, demonstration in enumerate(evaluation.demonstration):
+        scores = (f"{evaluation.scores[name][k]:g}" for name in names)
+        yield [int(demonstration), *scores, evaluation.failure[k]]
 
 
 def cached_results(configs: Sequence[Config]) -> dict[str, Any] | None:
@@ -102,7 +111,8 @@ def evaluation_fingerprint(configs: Sequence[Config]) -> str:
     return content.hexdigest()
 
 
-def _mean(rows: Sequence[Mapping[str, float]]) -> dict[str, float]:
+def mean_scores(rows: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """The mean of several seeds' scores."""
     return {name: float(np.mean([row[name] for row in rows])) for name in rows[0]}
 
 

@@ -15,6 +15,7 @@ from mjx_hand.view.figures.stress_figure import shares_over
 from mjx_hand.view.report import Table
 from train.experiment.evaluate_seeds import POLICY, PRESS
 from train.experiment.stress import CURVES, Stress, kept
+from train.reports.evaluation_record import mean_scores, rollout_rows
 
 SCHEMA = "mjx-hand/stress/1"
 _SCORES = {"CHORD": "chord", "held": "hold", "ManipTrans": "manip_trans_object"}
@@ -72,15 +73,12 @@ def write_stress(stress: Stress, folder: Path) -> None:
         written.writerow(["row", "column", "seed", "demonstration", *names, "failure"])
         for row, policies in stress.policies.items():
             for column, seed, e in [*((POLICY, s, e) for s, e in policies.items()), (PRESS, "", stress.press[row])]:
-                for k, which in enumerate(e.demonstration):
-                    scores = (f"{e.scores[name][k]:g}" for name in names)
-                    written.writerow([row, column, seed, int(which), *scores, e.failure[k]])
+                written.writerows([row, column, seed, *cells] for cells in rollout_rows(e, names))
 
 
 def _told(evaluations: Sequence[Evaluation]) -> Mapping[str, float]:
     share, low, high = _interval(evaluations)
-    scores = {name: float(np.mean([e.rows()[name] for e in evaluations])) for name in evaluations[0].scores}
-    return {"kept": share, "kept_low": low, "kept_high": high, **scores}
+    return {"kept": share, "kept_low": low, "kept_high": high, **mean_scores([e.rows() for e in evaluations])}
 
 
 def _interval(evaluations: Sequence[Evaluation]) -> tuple[float, float, float]:
@@ -92,9 +90,6 @@ def _interval(evaluations: Sequence[Evaluation]) -> tuple[float, float, float]:
 
 def _cells(evaluations: Sequence[Evaluation]) -> tuple[str, str]:
     share, low, high = (100 * value for value in _interval(evaluations))
-    means = [
-        100 * np.mean([e.rows()[name] for e in evaluations])
-        for name in _SCORES.values()
-        if name in evaluations[0].scores
-    ]
+    scores = mean_scores([e.rows() for e in evaluations])
+    means = [100 * scores[name] for name in _SCORES.values() if name in scores]
     return f"{share:.1f} ({low:.0f} to {high:.0f})", " / ".join(f"{mean:.1f}" for mean in means)

@@ -172,9 +172,8 @@ def test_ranges_that_cannot_be_are_refused(given, said):
 
 def test_a_demonstration_that_is_never_held_is_never_pushed(env):
     frames = env.num_frames
-    still = jnp.repeat(env.reference.object_pose[:, :1], frames, axis=1)
-    length = np.asarray(env.reference.length)
-    tables = episode_tables(Randomize.only(push=(5.0, 5.0)), np.asarray(still), length, env.fps)
+    still = [np.repeat(d.object_pose[:1], d.num_frames, axis=0) for d in env.demonstrations]
+    tables = episode_tables(Randomize.only(push=(5.0, 5.0)), still, env.fps)
     for key in jax.random.split(jax.random.key(0), 5):
         episode = draw_episode(tables, jnp.asarray(0), jnp.zeros(26), key)
         assert not np.any(jax.vmap(lambda f, e=episode: pushing(e, tables, f))(jnp.arange(frames)))
