@@ -57,7 +57,8 @@ def solver_load(engine: Engine, start: PhysicsState, controls: Float[Array, "t n
             data = mjx.step(model, data.replace(ctrl=ctrl))
             return data, step_load(data)
 
-        data = blank.replace(qpos=qpos, qvel=qvel, qacc_warmstart=warmstart)
+        placed = made.placed(blank, model) if engine.name == "warp" else blank
+        data = placed.replace(qpos=qpos, qvel=qvel, qacc_warmstart=warmstart)
         return jax.lax.scan(step, data, jnp.repeat(controls, engine.substeps, axis=0))[1]
 
     return mean_load(run(start.variant, start.qpos, start.qvel, start.memory, jnp.swapaxes(controls, 0, 1)))

@@ -23,6 +23,7 @@ from envs.physics.family import Family, leaf_names, make_family
 from envs.physics.recovery import recovered
 from envs.physics.solver import newton
 from mjx_hand.errors import InputError
+from mjx_hand.rotations import quaternion_to_matrix
 
 # Else a line for each of a hundred kernels. Where Warp is not installed, its name means this module to type checkers.
 warp.config.log_level = warp.LOG_WARNING  # pyright: ignore[reportAttributeAccessIssue]
@@ -52,6 +53,7 @@ class WarpEngine:
         self._family = make_family(models)
         _check_variable(self._family, models[0])
         self._sites = _sensor_sites(self.models[0])
+        self._still = _geoms_of_the_world(self.models[0])
         self._capacity = _capacity(self.models[0])
 
     @property
@@ -89,12 +91,23 @@ class WarpEngine:
 
         def one(v: Array, q: Array, qd: Array, w: Array, u: Array) -> tuple[Array, ...]:
             model = self._family.model(v)
-            data = blank.replace(qpos=q, qvel=qd, qacc_warmstart=w, ctrl=u)
+            data = self.placed(blank, model).replace(qpos=q, qvel=qd, qacc_warmstart=w, ctrl=u)
             # A loop, not copies of the call: Warp captures a CUDA graph for every set of buffers that it is given.
             data, _ = jax.lax.scan(lambda d, _: (mjx.step(model, d), None), data, length=self.substeps)
             return data.qpos, data.qvel, data.qacc_warmstart
 
         return jax.vmap(one)(variant, qpos, qvel, warmstart, ctrl)
+
+    def placed(self, blank: mjx.Data, model: mjx.Model) -> mjx.Data:
+        """`blank` with the geoms of the world where this model has them.
+
+        Warp takes geoms that nothing can move from its data, which have been made with the first model.
+        """
+        position, axes = model.geom_pos, quaternion_to_matrix(model.geom_quat)
+        return blank.replace(
+            geom_xpos=jnp.where(self._still[:, None], position, blank.geom_xpos),
+            geom_xmat=jnp.where(self._still[:, None, None], axes, blank.geom_xmat),
+        )
 
     def _look(self, variant: Array, qpos: Array) -> tuple[Array]:
         """The position sensors of worlds with one leading axis."""
@@ -156,6 +169,17 @@ def _check_variable(family: Family, model: mjx.Model) -> None:
             f"engine 'warp' cannot give each world its own {', '.join(stuck)}; "
             "use models that share one value, or engine 'native'"
         )
+
+
+def _geoms_of_the_world(model: mujoco.MjModel) -> np.ndarray:
+    """Which geoms are the world's own, that stand where `geom_pos` has them."""
+    fixed = model.body_weldid[model.geom_bodyid] == 0
+    if (model.geom_bodyid[fixed] != 0).any():
+        raise InputError(
+            "engine 'warp' cannot give each world its own place of a geom that is fixed to the world by a body of its "
+            "own; put it into the world itself, or use engine 'native'"
+        )
+    return fixed
 
 
 def _sensor_sites(model: mujoco.MjModel) -> np.ndarray:
