@@ -96,7 +96,7 @@ def test_keypoints(tmp_path, capsys):
     assert "1.2 %" in text
     assert f"next: mjx-hand keypoints {tmp_path / 'hand.npz'} --out hand.motion.npz" in text
     np.savez(tmp_path / "norate.npz", joints=keypoints_of(grip()))
-    assert "at a rate that the file does not say" in info(capsys, tmp_path / "norate.npz")
+    assert "at a rate that the file does not say; 30/s below is an example" in info(capsys, tmp_path / "norate.npz")
     assert "60 at 25/s" in info(capsys, tmp_path / "norate.npz", "--fps", "25")
 
 

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from mjx_hand.capture.timeline.clock_names import UNITS, unit_in
 from mjx_hand.capture.timeline.row_order import RowOrder, row_order
-from mjx_hand.capture.timeline.time_units import frame_step, near_equal, seconds_of
+from mjx_hand.capture.timeline.time_units import frame_step, near_equal, rates_by_unit, seconds_of
 from mjx_hand.capture.timeline.timeline import Timeline, interpolated, placed, rounding
 from mjx_hand.errors import InputError
 
@@ -90,7 +90,8 @@ def timeline_of(
     if seconds is not None:
         return found
     # The unit is not told, but in any of them these are the frames.
-    return Timeline(None, found.before, found.after, found.share, found.gap, found.twins, found.notes)
+    notes = (*found.notes, f"the unit of the times is not told: they would be {rates_by_unit(stamps)}")
+    return Timeline(None, found.before, found.after, found.share, found.gap, found.twins, notes)
 
 
 def _told(path: object, stamps: Float[Array, "t"] | None, what: str) -> Float[Array, "t"] | None:

@@ -73,5 +73,11 @@ def seconds_of(path: object, times: Float[Array, "t"], name: str) -> Float[Array
     return times * UNITS[best[0]] if len(best) == 1 else None
 
 
+def rates_by_unit(times: Float[Array, "t"]) -> str:
+    """The rates, in words, that each unit would give to times, of those at which hands are recorded."""
+    rates = {unit: 1 / frame_step(times * scale)[0] for unit, scale in UNITS.items()}
+    return ", ".join(f"{r:.4g}/s in {u}" for u, r in rates.items() if SLOWEST / SLACK <= r <= SLACK * FASTEST)
+
+
 def _score(step: float, even: bool) -> tuple[bool, bool]:
     return COMMON[0] <= 1 / step <= COMMON[1], even

@@ -58,11 +58,10 @@ def keypoint_facts(
     counted = (
         frames(found.num_frames, rate)
         if rate
-        else ("frames", f"{found.num_frames}, at a rate that the file does not say")
+        else ("frames", f"{found.num_frames}, at a rate that the file does not say; {USUAL_RATE:g}/s below is an example")
     )
     findings = map(str, keypoint_findings(replace(found, fps=rate), load_hand()))
     doubts = dict.fromkeys((*found.warnings, *picture_warning(found.positions), *findings))
-    warnings = tuple(("warning", doubt) for doubt in doubts)
     warnings = tuple(("warning", doubt) for doubt in doubts)
     return (names, ("side", _side(found, side)), counted, *_points(found), *warnings, *refused), commands
 

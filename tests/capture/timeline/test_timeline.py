@@ -58,8 +58,9 @@ def test_a_thousand_frames_a_second(name, scale, start):
 
 
 def test_a_unit_that_cannot_be_told_leaves_the_rate_open():
-    fps, kept, _ = frames_of(times=np.array([0.0, 1, 2, 3, 6, 7, 8]))  # 1/s or, in ms, 1000/s
+    fps, kept, notes = frames_of(times=np.array([0.0, 1, 2, 3, 6, 7, 8]))
     assert fps is None
+    assert notes == ("the unit of the times is not told: they would be 1/s in s, 1000/s in ms",)
     np.testing.assert_array_equal(kept, [0, 1, 2, 3, np.nan, np.nan, 4, 5, 6])
     with pytest.raises(InputError, match=r"'time_ms' in ms gives 3e\+04 frames a second; in s it would be 30"):
         frames_of(times=np.arange(9) / 30, name="time_ms")
