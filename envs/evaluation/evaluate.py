@@ -61,15 +61,19 @@ def evaluate(rollouts: Rollouts, objects: Sequence[ObjectDescription]) -> Evalua
     scores = {
         "manip_trans_object": success,
         "manip_trans_full": metrics.manip_trans_full(rollouts),
+        "manip_trans_frames": metrics.manip_trans_frames(rollouts),
         "spider": metrics.spider(rollouts),
         "chord": metrics.chord(rollouts),
         "add_auc": metrics.add_auc(rollouts, objects),
     }
     if rollouts.held.any() and (metrics.final_rise(rollouts) >= metrics.RAISED).any():
         scores["hold"] = metrics.hold(rollouts)
+    turned, moving = np.rad2deg(metrics.rotation_error(rollouts)), metrics.moving(rollouts)
     scores |= {
         "tracking_error_cm": metrics.tracking_error(rollouts),
-        "object_rotation_error_deg": np.rad2deg(metrics.over_counted(metrics.rotation_error(rollouts), rollouts)),
+        "moving_error_cm": 100 * metrics.over(metrics.position_error(rollouts), moving),
+        "object_rotation_error_deg": metrics.over_counted(turned, rollouts),
+        "moving_rotation_error_deg": metrics.over(turned, moving),
         "joint_error_cm": 100 * metrics.over_counted(metrics.joint_error(rollouts), rollouts),
         "tip_error_cm": 100 * metrics.over_counted(metrics.tip_error(rollouts), rollouts),
     }

@@ -19,12 +19,20 @@ from mjx_hand.objects.surface_points import surface_points
 MANIP_TRANS = {"rotation": np.deg2rad(30.0), "translation": 0.03, "joints": 0.08, "tips": 0.06}  # rad, m
 SPIDER = {"rotation": 0.5, "translation": 0.10}
 CHORD = {"rotation": 0.5, "translation": 0.10, "wrist": 0.15}
+# What ManipTrans' code (`failed_execute` in https://github.com/ManipTrans/ManipTrans) asks in each frame from the ninth
+# on, at the end of its training (s = 0.7 in 2 cm s³/0.343, 30° s³/0.343, 4 to 8 cm s/0.7), but for contacts.
+MANIP_TRANS_FRAME = {"rotation": np.deg2rad(30.0), "translation": 0.02, "first": 0.07, "others": 0.08}
+MANIP_TRANS_TIPS = np.array([0.045, 0.05, 0.06, 0.06, 0.04])  # m, in the order of `hand.joints.FINGERS`
+MANIP_TRANS_GRACE = 8  # frames
+MOVED, TURNED = 0.005, np.deg2rad(5.0)  # of the demonstrated object, from which on it counts as moving
 ADD_THRESHOLDS = np.arange(1, 10) / 100  # m
 ADD_POINTS = 500
 HOLD_SECONDS, HOLD_SLIP = 5.0, 0.02
 RAISED = 0.02  # m above its start from which an object counts as lifted
 
 _WRIST, _INDEX_KNUCKLE, _PINKY_KNUCKLE = 0, 1, 7  # three points of the palm, in the order of `hand.joints.LINKS`
+_FIRST = [1, 4, 7, 10, 13]  # the fingers' first joints; the others are those beyond
+_BEYOND = [2, 3, 5, 6, 8, 9, 11, 12, 14, 15]
 
 
 def position_error(rollouts: Rollouts) -> Float[np.ndarray, "n t"]:
@@ -34,10 +42,7 @@ def position_error(rollouts: Rollouts) -> Float[np.ndarray, "n t"]:
 
 def rotation_error(rollouts: Rollouts) -> Float[np.ndarray, "n t"]:
     """Angle (rad) between the object's orientation and the demonstrated one, frame by frame."""
-    a, b = rollouts.object_pose[..., 3:], rollouts.object_reference[..., 3:]
-    apart, together = np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1)
-    # q and -q are one rotation. The arc tangent keeps its accuracy near zero; an arc cosine loses half the digits.
-    return 4 * np.arctan2(np.minimum(apart, together), np.maximum(apart, together))
+    return _angle(rollouts.object_pose[..., 3:], rollouts.object_reference[..., 3:])
 
 
 def joint_error(rollouts: Rollouts) -> Float[np.ndarray, "n t"]:
@@ -50,9 +55,28 @@ def tip_error(rollouts: Rollouts) -> Float[np.ndarray, "n t"]:
     return np.linalg.norm(rollouts.tips - rollouts.tips_reference, axis=-1).mean(axis=-1)
 
 
+def moving(rollouts: Rollouts) -> Bool[np.ndarray, "n t"]:
+    """Counted frames from the first on in which the demonstrated object is 5 mm or 5° from where it began.
+
+    All counted frames where it never is.
+    """
+    rows = np.arange(len(rollouts.counted))
+    reference = np.where(rollouts.counted[..., None], rollouts.object_reference, 0.0)
+    start = reference[rows, np.argmax(rollouts.counted, axis=1)][:, None]
+    off = np.linalg.norm(reference[..., :3] - start[..., :3], axis=-1) >= MOVED
+    off |= _angle(reference[..., 3:], start[..., 3:]) >= TURNED
+    begun = np.logical_or.accumulate(off & rollouts.counted, axis=1)
+    return rollouts.counted & (begun | ~begun.any(axis=1, keepdims=True))
+
+
+def over(values: Float[np.ndarray, "n t"], frames: Bool[np.ndarray, "n t"]) -> Float[np.ndarray, "n"]:
+    """Mean over those frames of each rollout, which has one at least."""
+    return np.where(frames, values, 0.0).sum(axis=1) / frames.sum(axis=1)
+
+
 def over_counted(values: Float[np.ndarray, "n t"], rollouts: Rollouts) -> Float[np.ndarray, "n"]:
     """Mean over each rollout's counted frames."""
-    return np.where(rollouts.counted, values, 0.0).sum(axis=1) / rollouts.counted.sum(axis=1)
+    return over(values, rollouts.counted)
 
 
 def tracking_error(rollouts: Rollouts) -> Float[np.ndarray, "n"]:
@@ -71,6 +95,21 @@ def manip_trans_full(rollouts: Rollouts) -> Bool[np.ndarray, "n"]:
     joints = over_counted(joint_error(rollouts), rollouts) < MANIP_TRANS["joints"]
     tips = over_counted(tip_error(rollouts), rollouts) < MANIP_TRANS["tips"]
     return manip_trans_object(rollouts) & joints & tips
+
+
+def manip_trans_frames(rollouts: Rollouts) -> Bool[np.ndarray, "n"]:
+    """ManipTrans as its code scores: no counted frame from the ninth on reaches a bound (`MANIP_TRANS_FRAME`).
+
+    Object 2 cm and 30°; tips 4 cm (thumb), 4.5, 5, 6 and 6; the five first joints 7 cm and the ten others 8 cm on
+    average over them. Rollouts of eight counted frames and fewer succeed.
+    """
+    bound, off = MANIP_TRANS_FRAME, np.linalg.norm(rollouts.joints - rollouts.joints_reference, axis=-1)
+    good = (position_error(rollouts) < bound["translation"]) & (rotation_error(rollouts) < bound["rotation"])
+    good &= (np.linalg.norm(rollouts.tips - rollouts.tips_reference, axis=-1) < MANIP_TRANS_TIPS).all(axis=-1)
+    good &= off[..., _FIRST].mean(axis=-1) < bound["first"]
+    good &= off[..., _BEYOND].mean(axis=-1) < bound["others"]
+    judged = rollouts.counted & (np.cumsum(rollouts.counted, axis=1) > MANIP_TRANS_GRACE)
+    return (good | ~judged).all(axis=1)
 
 
 def spider(rollouts: Rollouts) -> Bool[np.ndarray, "n"]:
@@ -151,6 +190,13 @@ def rises(rollouts: Rollouts, pose: Float[np.ndarray, "n t 7"]) -> Float[np.ndar
     """Height (m) above the pose of each rollout's first counted frame."""
     first = np.argmax(rollouts.counted, axis=1)
     return pose[..., 2] - pose[np.arange(len(pose)), first, 2][:, None]
+
+
+def _angle(a: Float[np.ndarray, "n t 4"], b: Float[np.ndarray, "n #t 4"]) -> Float[np.ndarray, "n t"]:
+    """Angle (rad) between orientations; q and -q are one."""
+    apart, together = np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1)
+    # The arc tangent keeps its accuracy near zero; an arc cosine loses half the digits.
+    return 4 * np.arctan2(np.minimum(apart, together), np.maximum(apart, together))
 
 
 def _placed(points: Float[np.ndarray, "v 3"], pose: Float[np.ndarray, "t 7"]) -> Float[np.ndarray, "t v 3"]:

@@ -14,12 +14,15 @@ from train.reports.published import Published
 TITLES = {
     "manip_trans_object": "ManipTrans, object: means below 3 cm and 30°",
     "manip_trans_full": "ManipTrans: also joints below 8 cm, tips below 6 cm",
+    "manip_trans_frames": "ManipTrans, no frame past 2 cm, 30°, tips 4 to 6 cm, joints 7 and 8 cm",
     "spider": "SPIDER: means below 10 cm and 0.5 rad",
     "chord": "CHORD: never past 10 cm, 0.5 rad, wrist 15 cm",
     "hold": "still held 5 s later, slip below 2 cm",
     "add_auc": "ADD-AUC, 1 to 9 cm",
     "tracking_error_cm": "tracking error, mean over all rollouts",
+    "moving_error_cm": "tracking error from when the object is to move",
     "object_rotation_error_deg": "object rotation error",
+    "moving_rotation_error_deg": "object rotation error from when it is to move",
     "joint_error_cm": "joint position error",
     "tip_error_cm": "finger tip position error",
 }

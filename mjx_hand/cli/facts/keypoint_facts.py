@@ -55,11 +55,8 @@ def keypoint_facts(
     problem, commands = _advice(path, reader, contents, hands, side, sequence, fps)
     refused = (("to read it", problem),) if problem else ()
     rate = found.fps or fps
-    counted = (
-        frames(found.num_frames, rate)
-        if rate
-        else ("frames", f"{found.num_frames}, at a rate that the file does not say; {USUAL_RATE:g}/s below is an example")
-    )
+    unknown = f"at a rate that the file does not say; {USUAL_RATE:g}/s below is an example"
+    counted = frames(found.num_frames, rate) if rate else ("frames", f"{found.num_frames}, {unknown}")
     findings = map(str, keypoint_findings(replace(found, fps=rate), load_hand()))
     doubts = dict.fromkeys((*found.warnings, *picture_warning(found.positions), *findings))
     warnings = tuple(("warning", doubt) for doubt in doubts)

@@ -98,7 +98,10 @@ def test_frames_that_are_not_finite_become_gaps(arrays, tmp_path):
     ("change", "message"),
     [
         ({"mano": np.zeros((122, 51), np.float32)}, r"mano has shape \(122, 51\)"),
-        ({"mano": np.zeros((0, 61), np.float32), "joint_transforms": np.zeros((0, 16, 4, 4))}, "the recording has no frames"),
+        (
+            {"mano": np.zeros((0, 61), np.float32), "joint_transforms": np.zeros((0, 16, 4, 4))},
+            "the recording has no frames",
+        ),
         ({"mano": np.full((122, 61), np.nan)}, "none of its 122 frames is finite"),
         ({"mano": np.zeros((9, 61), np.float32)}, r"mano has shape \(9, 61\), expected \(122, 61\)"),
         ({"mano": np.full((122, 61), "a")}, "mano holds <U1, expected numbers"),

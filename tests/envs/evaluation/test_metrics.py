@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from envs.evaluation import metrics
 from envs.evaluation.rollout import Rollouts
 from mjx_hand.errors import InputError
+from mjx_hand.hand.joints import FINGERS
 from mjx_hand.objects.description import ObjectDescription
-from tests.envs.lifts import CUBE, carried, lift, moved
+from tests.envs.lifts import CUBE, carried, lift, moved, turned
 
 
 def hand_moved(rollouts: Rollouts, joints: float = 0.0, tips: float = 0.0) -> Rollouts:
@@ -28,6 +29,7 @@ def spike(value: float, frames: int = 40) -> np.ndarray:
 SUCCESS = {
     "manip_trans_object": metrics.manip_trans_object,
     "manip_trans_full": metrics.manip_trans_full,
+    "manip_trans_frames": metrics.manip_trans_frames,
     "spider": metrics.spider,
     "chord": metrics.chord,
 }
@@ -47,6 +49,8 @@ def test_following_to_the_letter_succeeds(metric):
         ("manip_trans_full", {"angle": np.deg2rad(29.9)}, {"angle": np.deg2rad(30.1)}),
         ("spider", {"by": 0.0999}, {"by": 0.1001}),
         ("spider", {"angle": 0.499}, {"angle": 0.501}),
+        ("manip_trans_frames", {"by": spike(0.0199)}, {"by": spike(0.0201)}),
+        ("manip_trans_frames", {"angle": spike(np.deg2rad(29.9))}, {"angle": spike(np.deg2rad(30.1))}),
         ("chord", {"by": spike(0.0999)}, {"by": spike(0.1001)}),
         ("chord", {"angle": spike(0.499)}, {"angle": spike(-0.501)}),
     ],
@@ -61,6 +65,8 @@ def test_object_thresholds(metric, inside, outside):
     [
         ("manip_trans_full", {"joints": 0.0799}, {"joints": 0.0801}),
         ("manip_trans_full", {"tips": 0.0599}, {"tips": 0.0601}),
+        ("manip_trans_frames", {"joints": 0.0699}, {"joints": 0.0701}),
+        ("manip_trans_frames", {"tips": 0.0399}, {"tips": 0.0401}),
         ("chord", {"joints": 0.1499}, {"joints": 0.1501}),
     ],
 )
@@ -75,6 +81,34 @@ def test_the_hand_matters_only_where_the_definition_says_so():
     assert metrics.spider(astray).all()
     far_fingers = dataclasses.replace(lift(), joints=lift().joints + np.r_[0.0, np.ones(15)][:, None])
     assert metrics.chord(far_fingers).all()  # its wrist is in place
+
+
+@pytest.mark.parametrize(("finger", "bound"), list(zip(FINGERS, (0.045, 0.05, 0.06, 0.06, 0.04), strict=True)))
+def test_each_finger_has_its_own_bound_in_a_frame(finger, bound):
+    for by, good in ((0.999 * bound, True), (1.001 * bound, False)):
+        tips = lift().tips.copy()
+        tips[0, 17, FINGERS.index(finger), 2] += by
+        assert metrics.manip_trans_frames(dataclasses.replace(lift(), tips=tips)).tolist() == [good]
+
+
+def test_the_first_eight_frames_are_not_judged():
+    for frame, good in ((7, True), (8, False)):
+        by = np.where(np.arange(40) == frame, 0.5, 0.0)
+        assert metrics.manip_trans_frames(moved(lift(), by=by)).tolist() == [good]
+
+
+def test_the_moving_part_begins_with_the_demonstrated_motion():
+    rollouts = lift(held=5)  # 5 mm a frame
+    np.testing.assert_array_equal(metrics.moving(rollouts)[0], (np.arange(45) >= 1) & (np.arange(45) < 40))
+    still = np.broadcast_to(rollouts.object_reference[:, :1], rollouts.object_reference.shape)
+    waiting = dataclasses.replace(rollouts, object_reference=still)
+    np.testing.assert_array_equal(metrics.moving(waiting), rollouts.counted)  # never: all of them
+    turning = turned(still, np.where(np.arange(45) >= 30, np.deg2rad(5.1), np.deg2rad(4.9)) * (np.arange(45) > 0))
+    begun = metrics.moving(dataclasses.replace(rollouts, object_reference=turning))[0]
+    np.testing.assert_array_equal(begun, (np.arange(45) >= 30) & (np.arange(45) < 40))
+    by = np.where(np.arange(45) < 1, 0.5, 0.01)  # before it is to move nothing matters
+    errors = metrics.over(metrics.position_error(moved(rollouts, by=by)), metrics.moving(rollouts))
+    np.testing.assert_allclose(errors, [0.01])
 
 
 @pytest.mark.parametrize("metric", ["manip_trans_object", "manip_trans_full", "spider"])
