@@ -21,7 +21,7 @@ class Evaluation:
         demonstration: which demonstration each rollout followed.
         scores: metric name to its value for each rollout: success as bool, `add_auc` 0 to 1, errors in the unit that
             ends their name. `hold` is there only where the rollouts went on after the demonstration, and where any
-            demonstration ends with its object raised.
+            demonstration ends with its object raised; `kept` is `chord`, and `hold` where it is there.
         failure: why each rollout failed `manip_trans_object` (a word of `failure.FAILURES`), "" where it did not.
     """
 
@@ -68,6 +68,7 @@ def evaluate(rollouts: Rollouts, objects: Sequence[ObjectDescription]) -> Evalua
     }
     if rollouts.held.any() and (metrics.final_rise(rollouts) >= metrics.RAISED).any():
         scores["hold"] = metrics.hold(rollouts)
+    scores["kept"] = scores["chord"] & scores.get("hold", True)
     turned, moving = np.rad2deg(metrics.rotation_error(rollouts)), metrics.moving(rollouts)
     scores |= {
         "tracking_error_cm": metrics.tracking_error(rollouts),

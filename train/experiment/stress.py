@@ -7,9 +7,6 @@ frame 0; directions differ from demonstration to demonstration. The last row dra
 import dataclasses
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-from jaxtyping import Bool
-
 from envs.disturbances.randomize import Randomize
 from envs.evaluation.constant_press import constant_press, search_press
 from envs.evaluation.evaluate import Evaluation, evaluate
@@ -65,12 +62,6 @@ class Stress:
     strengths: Mapping[str, str]
 
 
-def kept(evaluation: Evaluation) -> Bool[np.ndarray, "n"]:
-    """Whether each rollout was never lost (CHORD) and, where it ends raised, still held at the end."""
-    chord = np.asarray(evaluation.scores["chord"], bool)
-    return chord & np.asarray(evaluation.scores["hold"], bool) if "hold" in evaluation.scores else chord
-
-
 def stress(configs: Sequence[Config], part: str = "heldout") -> Stress:
     """Roll out each seed's policy and the constant press under every row.
 
@@ -107,7 +98,7 @@ def stress(configs: Sequence[Config], part: str = "heldout") -> Stress:
             scored = [
                 evaluate(zero(None, dataclasses.replace(tables, reference=reference)), objects) for reference in pressed
             ]
-            presses[row] = max(scored, key=lambda evaluation: kept(evaluation).mean())
+            presses[row] = max(scored, key=lambda evaluation: evaluation.scores["kept"].mean())
             advance(1)
     strengths = {
         grasp: " or ".join(dict.fromkeys(press.described(each)[grasp] for each in known)) for grasp in press.full

@@ -17,10 +17,11 @@ from envs.evaluation.evaluate import Evaluation
 from envs.grasps import grasp_names, grasp_type
 from mjx_hand.files.npz_archive import replacing
 from train.experiment.evaluate_seeds import POLICY, Results, shared_folder
+from train.reports.interval import intervals
 from train.reports.type_table import type_scores
 from train.settings.config import Config
 
-SCHEMA = "mjx-hand/evaluation/2"  # 2: with the constant press
+SCHEMA = "mjx-hand/evaluation/3"  # 2: with the constant press; 3: with intervals
 
 
 def write_results(results: Mapping[int, Results], configs: Sequence[Config], films: Mapping[str, Any]) -> Path:
@@ -46,6 +47,10 @@ def write_results(results: Mapping[int, Results], configs: Sequence[Config], fil
         "scores": {
             POLICY: mean_scores([e.rows() for e in policies.values()]),
             **{t: e.rows() for t, e in baselines.items()},
+        },
+        "intervals": {
+            POLICY: intervals(list(policies.values())),
+            **{t: intervals([e]) for t, e in baselines.items()},
         },
         "types": {
             POLICY: {grasp: mean_scores([scores[grasp] for scores in by_type]) for grasp in by_type[0]},

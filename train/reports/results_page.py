@@ -57,13 +57,14 @@ def _page(experiments: Sequence[Experiment], waiting: Sequence[str], command: st
         title="mjx-hand: results",
         task=_TASK + (f" Not done yet: {', '.join(waiting)}." if waiting else ""),
         headlines=(
-            Headline("success", last["success"], _beside(last["paper's success"])),
-            Headline("tracking error", last["tracking error"], _beside(last["paper's tracking error"])),
+            Headline("never lost (CHORD)", last["CHORD"]),
             *([Headline("held 5 s longer", last["held 5 s"])] if last["held 5 s"] else []),
+            Headline("tracking error", last["tracking error"], _beside(last["paper's tracking error"])),
             Headline(
-                "constant press, nothing learned",
+                "nothing learned: never lost and held",
                 last["constant press"],
-                f"zero residual {last['zero residual']}, demonstration alone {last['demonstration alone']}",
+                f"constant press; policies {last['followed']}, zero residual {last['zero residual']}, "
+                f"demonstration alone {last['demonstration alone']}",
             ),
         ),
         sections=(

@@ -9,15 +9,17 @@ from envs.evaluation.failure import FAILURES
 from mjx_hand.errors import InputError
 from mjx_hand.objects.description import ObjectDescription
 from mjx_hand.view.report import Table
+from train.reports.interval import intervals
 from train.reports.published import Published
 
 TITLES = {
+    "kept": "followed: never lost, and held to the end",
+    "chord": "CHORD: never past 10 cm, 0.5 rad, wrist 15 cm",
+    "hold": "still held 5 s later, slip below 2 cm",
     "manip_trans_object": "ManipTrans, object: means below 3 cm and 30°",
     "manip_trans_full": "ManipTrans: also joints below 8 cm, tips below 6 cm",
     "manip_trans_frames": "ManipTrans, no frame past 2 cm, 30°, tips 4 to 6 cm, joints 7 and 8 cm",
     "spider": "SPIDER: means below 10 cm and 0.5 rad",
-    "chord": "CHORD: never past 10 cm, 0.5 rad, wrist 15 cm",
-    "hold": "still held 5 s later, slip below 2 cm",
     "add_auc": "ADD-AUC, 1 to 9 cm",
     "tracking_error_cm": "tracking error, mean over all rollouts",
     "moving_error_cm": "tracking error from when the object is to move",
@@ -35,7 +37,8 @@ def score_table(
 
     Args:
         evaluations: column title to its evaluations, one a seed. Several give two columns: the mean over the seeds,
-            and the range from the least seed to the greatest.
+            and the range from the least seed to the greatest. Shares have their 95 % interval (Wilson) beside them,
+            over all seeds' rollouts.
         paper: the paper's row for the same grasp type; its success, which it does not define, gets a row of its own.
         note: printed below the table.
 
@@ -45,10 +48,15 @@ def score_table(
     if not evaluations:
         raise InputError("no evaluations to show; give at least one column")
     means = {title: [e.rows() for e in each] for title, each in evaluations.items()}
+    bounds = {title: intervals(each) for title, each in evaluations.items()}
     columns = [column for title, each in means.items() for column in _columns(title, len(each))]
     rows = []
     for name, title in TITLES.items():
-        cells = [cell for each in means.values() for cell in _cells(name, [row.get(name) for row in each])]
+        cells = [
+            cell
+            for title, each in means.items()
+            for cell in _cells(name, [row.get(name) for row in each], bounds[title].get(name))
+        ]
         published = [score_text(name, paper.tracking_error_cm) if name == "tracking_error_cm" else ""] if paper else []
         if any(cells):
             rows.append((title, *cells, *published))
@@ -111,6 +119,11 @@ def object_text(obj: ObjectDescription) -> str:
     return f"{obj.kind} {size} mm, {1000 * float(obj.mass):.0f} g, friction {float(obj.friction):.2f}"
 
 
+def share_text(share: float, interval: tuple[float, float]) -> str:
+    """A share and its 95 % interval."""
+    return f"{100 * share:.1f} % ({100 * interval[0]:.0f} to {100 * interval[1]:.0f})"
+
+
 def score_text(name: str, value: float) -> str:
     """A metric's value with its unit."""
     unit = " cm" if name.endswith("_cm") else "°" if name.endswith("_deg") else "" if name == "add_auc" else " %"
@@ -136,11 +149,12 @@ def _columns(title: str, seeds: int) -> list[str]:
     return [title] if seeds == 1 else [f"{title}, mean of {seeds} seeds", "least to greatest"]
 
 
-def _cells(name: str, values: Sequence[float | None]) -> list[str]:
+def _cells(name: str, values: Sequence[float | None], interval: tuple[float, float] | None) -> list[str]:
     given = [value for value in values if value is not None]
     if not given:
         return [""] * len(_columns("", len(values)))
-    mean = score_text(name, float(np.mean(given)))
+    mean = float(np.mean(given))
+    mean = share_text(mean, interval) if interval else score_text(name, mean)
     if len(values) == 1:
         return [mean]
     least, greatest = score_text(name, min(given)), score_text(name, max(given))

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from scipy.stats import binomtest
 
 from envs.evaluation.evaluate import Evaluation
 from mjx_hand.files.npz_archive import replacing
 from mjx_hand.view.figures.stress_figure import shares_over
 from mjx_hand.view.report import Table
 from train.experiment.evaluate_seeds import POLICY, PRESS
-from train.experiment.stress import CURVES, Stress, kept
+from train.experiment.stress import CURVES, Stress
 from train.reports.evaluation_record import mean_scores, rollout_rows
+from train.reports.interval import wilson
 
 SCHEMA = "mjx-hand/stress/1"
 _SCORES = {"CHORD": "chord", "held": "hold", "ManipTrans": "manip_trans_object"}
@@ -78,14 +78,13 @@ def write_stress(stress: Stress, folder: Path) -> None:
 
 def _told(evaluations: Sequence[Evaluation]) -> Mapping[str, float]:
     share, low, high = _interval(evaluations)
-    return {"kept": share, "kept_low": low, "kept_high": high, **mean_scores([e.rows() for e in evaluations])}
+    return {"kept_low": low, "kept_high": high, **mean_scores([e.rows() for e in evaluations]), "kept": share}
 
 
 def _interval(evaluations: Sequence[Evaluation]) -> tuple[float, float, float]:
-    """Share of rollouts that are kept, and its 95 % interval (Wilson 1927)."""
-    success = np.concatenate([kept(e) for e in evaluations])
-    found = binomtest(int(success.sum()), len(success)).proportion_ci(method="wilson")
-    return float(success.mean()), float(found.low), float(found.high)
+    """Share of rollouts that are kept, and its 95 % interval."""
+    success = np.concatenate([e.scores["kept"] for e in evaluations])
+    return float(success.mean()), *wilson(success)
 
 
 def _cells(evaluations: Sequence[Evaluation]) -> tuple[str, str]:

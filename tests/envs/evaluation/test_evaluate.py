@@ -73,10 +73,18 @@ def test_held_frames_count_for_hold_alone():
     gone = rollouts.object_pose.copy()
     gone[:, 40:, :3] += 5.0
     found = evaluate(dataclasses.replace(rollouts, object_pose=gone), [CUBE]).rows()
-    assert found.pop("hold") == 0.0
+    assert [found.pop(name) for name in ("hold", "kept")] == [0.0, 0.0]
     kept = evaluate(rollouts, [CUBE]).rows()
-    assert kept.pop("hold") == 1.0
+    assert [kept.pop(name) for name in ("hold", "kept")] == [1.0, 1.0]
     assert found == kept
+
+
+def test_what_is_lost_on_the_way_is_not_kept():
+    rollouts = lift(held=250)
+    early = rollouts.object_pose.copy()
+    early[:, 17, 0] += 0.11
+    found = evaluate(dataclasses.replace(rollouts, object_pose=early), [CUBE]).rows()
+    assert [found[name] for name in ("chord", "hold", "kept")] == [0.0, 1.0, 0.0]
 
 
 def test_what_is_put_down_is_not_to_be_held():

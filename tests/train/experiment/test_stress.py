@@ -72,7 +72,8 @@ def test_the_page_the_files_and_the_table_say_the_same(tiny: Config, trained: tu
 def test_intervals_are_wilsons():
     def scored(successes: int) -> Evaluation:
         chord = np.arange(10) < 9
-        scores = {"chord": chord, "hold": np.arange(10) < successes, "manip_trans_object": chord}
+        hold = np.arange(10) < successes
+        scores = {"chord": chord, "hold": hold, "kept": chord & hold, "manip_trans_object": chord}
         return Evaluation(np.zeros(10, int), scores, ("",) * 10)
 
     found = Stress(

@@ -23,13 +23,13 @@ def evaluation(success: list[bool], **scores: list[float]) -> Evaluation:
 
 def test_a_row_a_metric_and_a_column_a_policy():
     policy = evaluation([True, True, True, False], add_auc=[1.0, 1.0, 1.0, 0.25])
-    baseline = evaluation([False] * 4, hold=[0.0, 1.0, 0.0, 0.0])
+    baseline = evaluation([False] * 4, kept=[False, True, False, False])
     table = score_table({"policy": [policy], "zero residual": [baseline]}, PAPER["pinch"])
     assert table.columns == ("", "policy", "zero residual", "paper")
     assert table.rows == [
         ("success, by the paper's own count", "", "", "82.3 %"),
-        (TITLES["manip_trans_object"], "75.0 %", "0.0 %", ""),
-        (TITLES["hold"], "", "25.0 %", ""),
+        (TITLES["kept"], "", "25.0 % (5 to 70)", ""),
+        (TITLES["manip_trans_object"], "75.0 % (30 to 95)", "0.0 % (0 to 49)", ""),
         (TITLES["add_auc"], "0.812", "", ""),
         (TITLES["tracking_error_cm"], "2.38 cm", "8.00 cm", "0.95 cm"),
     ]
@@ -52,7 +52,7 @@ def test_several_seeds_have_their_mean_and_their_range():
     table = score_table({"policy": seeds, "zero residual": [evaluation([False] * 2)]}, PAPER["pinch"])
     assert table.columns == ("", "policy, mean of 3 seeds", "least to greatest", "zero residual", "paper")
     shown = {row[0]: row[1:] for row in table.rows}
-    assert shown[TITLES["manip_trans_object"]] == ("83.3 %", "50.0 to 100.0 %", "0.0 %", "")
+    assert shown[TITLES["manip_trans_object"]] == ("83.3 % (44 to 97)", "50.0 to 100.0 %", "0.0 % (0 to 66)", "")
     assert shown[TITLES["tracking_error_cm"]] == ("1.75 cm", "0.50 to 4.25 cm", "8.00 cm", "0.95 cm")
     assert ("dropped", "16.7 %") in failure_table({"policy": seeds}).rows
 
