@@ -88,7 +88,7 @@ def test_of_several_seeds_the_table_has_the_mean_and_the_range(results: dict[int
     scores, _ = tables(results, tiny)
     assert list(scores.columns) == ["", "policy, mean of 2 seeds", "least to greatest", *BASELINES, "paper"]
     errors = [results[seed].evaluations[POLICY].rows()["tracking_error_cm"] for seed in SEEDS]
-    (shown,) = [row for row in scores.rows if row[0].startswith("tracking error")]
+    (shown,) = [row for row in scores.rows if row[0] == "tracking error, mean over all rollouts"]
     assert shown[1] == f"{np.mean(errors):.2f} cm"
     least, greatest = f"{min(errors):.2f} cm", f"{max(errors):.2f} cm"
     assert shown[2] in (least, f"{least.removesuffix(' cm')} to {greatest}")

@@ -14,6 +14,7 @@ import numpy as np
 
 from envs.evaluation.constant_press import constant_press, search_press
 from envs.evaluation.evaluate import Evaluation, evaluate
+from envs.evaluation.overlap import Overlap, hand_overlap
 from envs.evaluation.roll_out import make_roll_out, zero_residual
 from envs.evaluation.rollout import Rollouts
 from envs.tracking import TrackingEnv
@@ -40,6 +41,7 @@ class Results:
         checkpoint: the policy.
         rollouts, evaluations: by column title.
         press: how hard the constant press is, in words, by grasp type.
+        overlaps: how deep the hand was in itself and the ground, by column title.
     """
 
     env: TrackingEnv
@@ -47,6 +49,7 @@ class Results:
     rollouts: Mapping[str, Rollouts]
     evaluations: Mapping[str, Evaluation]
     press: Mapping[str, str]
+    overlaps: Mapping[str, Overlap]
 
 
 def evaluate_seeds(configs: Sequence[Config], part: str = "heldout") -> dict[int, Results]:
@@ -84,6 +87,7 @@ def evaluate_seeds(configs: Sequence[Config], part: str = "heldout") -> dict[int
             rollouts[title] = roll_out(None, given[title])
             advance(1)
     scores = {key: evaluate(each, objects) for key, each in rollouts.items()}
+    overlaps = {key: hand_overlap(each, env.models) for key, each in rollouts.items()}
     keys = {seed: {POLICY: seed, **{title: title for title in BASELINES}} for seed in checkpoints}
     return {
         seed: Results(
@@ -92,6 +96,7 @@ def evaluate_seeds(configs: Sequence[Config], part: str = "heldout") -> dict[int
             {title: rollouts[key] for title, key in keys[seed].items()},
             {title: scores[key] for title, key in keys[seed].items()},
             press.described(strengths),
+            {title: overlaps[key] for title, key in keys[seed].items()},
         )
         for seed, checkpoint in checkpoints.items()
     }

@@ -16,6 +16,7 @@ from train.experiment.stress import Stress
 from train.reports.evaluation_record import mean_scores
 from train.reports.interval import intervals
 from train.reports.machine import processor, versions
+from train.reports.overlap_table import overlap_table
 from train.reports.published import PAPER
 from train.reports.score_table import demonstration_table, failed_table, failure_table, score_table
 from train.reports.stress_table import stress_figure, stress_table
@@ -52,6 +53,13 @@ def headlines(policies: Sequence[Evaluation]) -> list[Headline]:
         for name, title in (("chord", "never lost (CHORD)"), ("hold", "held 5 s longer"))
         if name in scores
     ]
+
+
+def overlaps(results: Mapping[int, Results]) -> Table:
+    """How deep the hand was in itself and the ground, of all seeds together and the baselines."""
+    first = next(iter(results.values()))
+    columns = {POLICY: [result.overlaps[POLICY] for result in results.values()]}
+    return overlap_table(columns | {title: [first.overlaps[title]] for title in BASELINES})
 
 
 def pressed(results: Results) -> str:
@@ -142,6 +150,7 @@ def evaluation_page(
             ),
             Section("Demonstration and twin", [shown["worst"], shown["median"]]),
             Section("Tracking error over time", [Plot(tracking_plot(results), TRACKING)]),
+            Section("The hand in itself and the ground", [overlaps(results)]),
             Section("How failures failed", [failures]),
             *([Section("Failures", [failed])] if failed.rows else []),
             Section("Every demonstration", [demonstration_table(policies, baselines, objects)]),

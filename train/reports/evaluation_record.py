@@ -18,10 +18,11 @@ from envs.grasps import grasp_names, grasp_type
 from mjx_hand.files.npz_archive import replacing
 from train.experiment.evaluate_seeds import POLICY, Results, shared_folder
 from train.reports.interval import intervals
+from train.reports.overlap_table import overlap_scores
 from train.reports.type_table import type_scores
 from train.settings.config import Config
 
-SCHEMA = "mjx-hand/evaluation/3"  # 2: with the constant press; 3: with intervals
+SCHEMA = "mjx-hand/evaluation/3"  # 2: with the constant press; 3: with intervals and overlaps
 
 
 def write_results(results: Mapping[int, Results], configs: Sequence[Config], films: Mapping[str, Any]) -> Path:
@@ -55,6 +56,10 @@ def write_results(results: Mapping[int, Results], configs: Sequence[Config], fil
         "types": {
             POLICY: {grasp: mean_scores([scores[grasp] for scores in by_type]) for grasp in by_type[0]},
             **{title: type_scores(e, grasps) for title, e in baselines.items()},
+        },
+        "overlap": {
+            POLICY: overlap_scores([result.overlaps[POLICY] for result in results.values()]),
+            **{title: overlap_scores([first.overlaps[title]]) for title in baselines},
         },
         "constant_press": dict(first.press),
         "seeds": {seed: e.rows() for seed, e in policies.items()},
