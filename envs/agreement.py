@@ -11,12 +11,10 @@ from jaxtyping import Array, Bool, Float, Int
 
 from envs.physics.engine import Engine, PhysicsState
 from envs.physics.native import NativeEngine
-from envs.scene import NUM_WRIST
 from envs.tracking import TrackingEnv
-from mjx_hand.hand.joints import NUM_HINGES
 
 STEPS = 6  # control steps of the comparison: longer, and paths in contact part from rounding on
-_THING = slice(NUM_WRIST + NUM_HINGES, NUM_WRIST + NUM_HINGES + 3)
+_OBJECT = slice(-7, -4)  # its place, in a free joint that is the last of all
 _NOISE = 0.002  # standard deviation (m, rad) of what is added to the demonstration's targets
 _LIFTED = 0.02  # m above its start, where the hand must be holding the object
 
@@ -47,7 +45,7 @@ class Worlds(NamedTuple):
     variant: Int[Array, "n"]
     qpos: Float[Array, "n q"]
     qvel: Float[Array, "n v"]
-    controls: Float[Array, "t n 26"]
+    controls: Float[Array, "t n u"]
     gripping: Bool[np.ndarray, "n"]
 
 
@@ -126,7 +124,7 @@ class Departure:
 
 def departure(found: PhysicsState, wanted: PhysicsState, gripping: Bool[np.ndarray, "n"]) -> Departure:
     """Compare an engine's states after each step with the C engine's."""
-    distance = np.linalg.norm(np.asarray(found.qpos - wanted.qpos)[..., _THING], axis=-1).max(axis=0)
+    distance = np.linalg.norm(np.asarray(found.qpos - wanted.qpos)[..., _OBJECT], axis=-1).max(axis=0)
     tips = np.abs(np.asarray(found.sensordata - wanted.sensordata)).max(axis=(0, 2))
     return Departure(
         free=float(max(distance[~gripping].max(), tips[~gripping].max())),

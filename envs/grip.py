@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from mjx_hand.hand.joints import FINGERS
+from mjx_hand.hand.joints import FINGERS, LINKS
 from mjx_hand.objects.primitives import signed_distance
 from mjx_hand.rigid.capsules import capsule_points
 from mjx_hand.rigid.gains import Gains
@@ -22,7 +22,7 @@ _ALONG = np.linspace(0.0, 1.0, 5)
 
 
 def grip_offsets(
-    angles: Float[Array, "t 20"],
+    angles: Float[Array, "t j"],
     object_in_hand: tuple[Float[Array, "t 3 3"], Float[Array, "t 3"]],
     rigid: RigidHand,
     kind: str,
@@ -30,7 +30,7 @@ def grip_offsets(
     force: float | Float[Array, ""],
     gains: Gains,
     planes: Float[Array, "h f 4"] | None = None,
-) -> Float[Array, "t 20"]:
+) -> Float[Array, "t j"]:
     """Hinge offsets (rad) that put each touching phalanx on the object's surface and press it there.
 
     Two parts: a damped least-squares step that closes gaps (or opens them, where capture error left a finger inside),
@@ -50,9 +50,10 @@ def grip_offsets(
         planes: of a mesh (`mjx_hand.objects.primitives.hull_planes`).
     """
     pads = jnp.array([k for k, link in enumerate(rigid.capsule_links) if link > 0])
-    links = np.array([link for link in rigid.capsule_links if link > 0])
-    of_finger = jnp.asarray((links[:, None] - 1) // 3 == np.arange(5), jnp.float32)  # (capsules, fingers)
-    thumb = jnp.arange(5) == FINGERS.index("thumb")
+    links = [LINKS[link] for link in rigid.capsule_links if link > 0]
+    belongs = [[link.startswith(finger) for finger in FINGERS] for link in links]
+    of_finger = jnp.asarray(belongs, jnp.float32)  # (capsules, fingers)
+    thumb = jnp.array([finger == "thumb" for finger in FINGERS])
     radius = rigid.capsule_radius[pads]
     stiffness, limit = jnp.asarray(gains.stiffness), jnp.asarray(gains.force_limit)
     rows = jnp.arange(len(links))
@@ -74,7 +75,7 @@ def grip_offsets(
         touches = jnp.minimum(phalanges, 1.0)
         of_hand = jnp.where(thumb, touches, touches / jnp.maximum(jnp.sum(touches * ~thumb), 1.0))
         share = touching * (of_finger @ (of_hand / jnp.maximum(phalanges, 1.0)))
-        jacobian = jax.jacfwd(axis_points)(q)[rows, closest]  # (capsules, 3, 20)
+        jacobian = jax.jacfwd(axis_points)(q)[rows, closest]  # (capsules, 3, joints)
         torque = jnp.einsum("cak,ca->k", jacobian, force * share[:, None] * inward)
         rows_of_gap = jnp.einsum("cak,ca->ck", jacobian, inward) * touching[:, None]
         square = rows_of_gap @ rows_of_gap.T + _DAMPING**2 * jnp.eye(len(links))

@@ -8,12 +8,19 @@ from envs.physics.engine import PhysicsState
 from envs.reference import Reference
 from envs.scene import NUM_WRIST
 from envs.task import Task
-from mjx_hand.hand.joints import NUM_HINGES
+from mjx_hand.bodies.body import Body
 from mjx_hand.objects.description import OBJECT_KINDS
-from mjx_hand.player.features import OBSERVATION_LIMIT, Feature, Seen, feature_table, offsets_and_scales
+from mjx_hand.player.features import (
+    HUMAN,
+    OBSERVATION_LIMIT,
+    Feature,
+    HandNames,
+    Seen,
+    feature_table,
+    offsets_and_scales,
+)
 from mjx_hand.rotations import axis_angle_matrix, quaternion_difference, quaternion_to_matrix
 
-_NUM_TARGETS = NUM_WRIST + NUM_HINGES
 _PROPERTIES = ("object_mass", "object_friction")  # what no camera sees
 
 
@@ -23,34 +30,35 @@ def wrist_rotation(turns: Float[Array, "3"], base: Float[Array, "3 3"]) -> Float
     return base @ x @ y @ z
 
 
-def residual_scale(task: Task) -> Float[np.ndarray, "26"]:
+def residual_scale(task: Task, hand: HandNames = HUMAN) -> Float[np.ndarray, "u"]:
     """What a residual of 1 is worth for each target (m, rad)."""
     return np.concatenate(
         [
             np.full(3, task.residual_scale_wrist_position),
             np.full(3, task.residual_scale_wrist_rotation),
-            np.full(NUM_HINGES, task.residual_scale_fingers),
+            np.full(len(hand.joints), task.residual_scale_fingers),
         ]
     )
 
 
-def observed_features(task: Task) -> tuple[Feature, ...]:
-    """What a policy of this task sees, in order."""
-    table = feature_table(residual_scale(task), task.lookahead, OBJECT_KINDS)
+def observed_features(task: Task, hand: HandNames = HUMAN) -> tuple[Feature, ...]:
+    """What a policy of this task and hand sees, in order."""
+    table = feature_table(residual_scale(task, hand), task.lookahead, OBJECT_KINDS, hand)
     return table if task.observe_properties else tuple(feature for feature in table if feature.name not in _PROPERTIES)
 
 
 def observe(
     reference: Reference,
     task: Task,
+    body: Body,
     demonstration: Int[Array, ""],
     frame: Int[Array, ""],
     physics: PhysicsState,
-    residual: Float[Array, "26"],
+    residual: Float[Array, "u"],
 ) -> Float[Array, "o"]:
     """The observation at `frame` of a demonstration."""
-    seen = _seen(reference, task, demonstration, frame, physics, residual)
-    table = observed_features(task)
+    seen = _seen(reference, task, body, demonstration, frame, physics, residual)
+    table = observed_features(task, body.names)
     offset, scale = offsets_and_scales(table)
     features = jnp.concatenate([feature.value(seen).ravel() for feature in table])
     return jnp.clip((features - offset) * scale, -OBSERVATION_LIMIT, OBSERVATION_LIMIT)
@@ -59,26 +67,28 @@ def observe(
 def _seen(
     reference: Reference,
     task: Task,
+    body: Body,
     demonstration: Int[Array, ""],
     frame: Int[Array, ""],
     physics: PhysicsState,
-    residual: Float[Array, "26"],
+    residual: Float[Array, "u"],
 ) -> Seen:
     base, length = reference.base[demonstration], reference.length[demonstration]
     targets, poses = reference.targets[demonstration], reference.object_pose[demonstration]
     later = jnp.minimum(frame + jnp.array(task.lookahead), length - 1)
-    hand, object_pose = physics.qpos[:_NUM_TARGETS], physics.qpos[_NUM_TARGETS:]
+    hand, first = body.of_targets(physics.qpos), body.num_coordinates
+    object_pose = physics.qpos[first:]
     return Seen(
         hand=hand,
-        hand_speed=physics.qvel[:_NUM_TARGETS],
+        hand_speed=body.of_targets(physics.qvel),
         residual=residual,
         object_pose=object_pose,
-        object_speed=physics.qvel[_NUM_TARGETS:],
+        object_speed=physics.qvel[first:],
         object_turn=quaternion_difference(poses[frame, 3:], object_pose[3:]),
         object_axes=quaternion_to_matrix(object_pose[3:]),
         wrist_place=base @ hand[:3],
         wrist_axes=wrist_rotation(hand[3:NUM_WRIST], base),
-        tips=physics.sensordata.reshape(5, 3),
+        tips=physics.sensordata.reshape(-1, 3),
         base=base,
         target=targets[frame],
         grip=reference.grip[demonstration, frame],

@@ -22,7 +22,7 @@ class Caught:
 
     count: Int[Array, "*b"]
     twin: Twin
-    action: Float[Array, "*b 26"]
+    action: Float[Array, "*b u"]
 
 
 class ParallelEnv(Env):
@@ -61,7 +61,7 @@ class ParallelEnv(Env):
         """One state a key; rng has a leading axis."""
         return jax.vmap(self._reset)(rng)
 
-    def step(self, state: State, action: Float[Array, "n 26"]) -> State:
+    def step(self, state: State, action: Float[Array, "n u"]) -> State:
         """One control step of every world, as `TrackingEnv.step`; a new episode follows one that has ended."""
         return jax.vmap(self._step)(state, action)
 
@@ -80,7 +80,7 @@ class ParallelEnv(Env):
             info["caught"] = Caught(count=count, twin=twin_of(state), action=idle)
         return state.replace(info=info)  # type: ignore[attr-defined]
 
-    def _step(self, state: State, action: Float[Array, "26"]) -> State:
+    def _step(self, state: State, action: Float[Array, "u"]) -> State:
         ours = {name: state.info[name] for name in ("truncation", "progress")}
         stepped = self.env.step(state.replace(info=ours), action)  # type: ignore[attr-defined]
         now, later = jax.random.split(state.info["rng"])

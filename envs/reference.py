@@ -11,9 +11,14 @@ from scipy.spatial.transform import Rotation
 
 from envs.grasps import grasp_names, grasp_type
 from envs.grip import grip_offsets
+from envs.model_grip import model_grips
 from envs.scene import NUM_WRIST, base_rotation, wrist_coordinates
+from mjx_hand.bodies.body import Body
+from mjx_hand.bodies.body_places import body_model, model_places
+from mjx_hand.bodies.coordinates import hand_coordinates
+from mjx_hand.bodies.human_body import body_of
 from mjx_hand.errors import InputError
-from mjx_hand.files.array_cache import cached
+from mjx_hand.files.array_cache import cached, model_bytes
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.objects.description import OBJECT_KINDS, ObjectDescription
 from mjx_hand.objects.primitives import hull_planes
@@ -27,20 +32,20 @@ class Reference:
     """d demonstrations, padded to t frames by holding their last; metres, radians, quaternions wxyz.
 
     Attributes:
-        targets: the wrist's slides and turns, and the hinge angles, as demonstrated.
+        targets: the wrist's slides and turns, and the values of actuated joints, as demonstrated.
         controls: what to command so that the controllers are at each target when its frame comes, and press.
         grip: the share of the controls that presses the fingers on the object.
-        tips: finger tips in the world, as demonstrated, in the order of `hand.joints.FINGERS`.
+        tips: finger tips in the world, as demonstrated, in the order of the hand's fingers.
         object_pose: in the world.
         base: world_from_base of each scene's wrist.
         features: object size (m), mass (kg), friction, and 1 for its kind among `OBJECT_KINDS`.
         length: frames of each demonstration.
     """
 
-    targets: Float[Array, "d t 26"]
-    controls: Float[Array, "d t 26"]
-    grip: Float[Array, "d t 26"]
-    tips: Float[Array, "d t 5 3"]
+    targets: Float[Array, "d t u"]
+    controls: Float[Array, "d t u"]
+    grip: Float[Array, "d t u"]
+    tips: Float[Array, "d t tips 3"]
     object_pose: Float[Array, "d t 7"]
     base: Float[Array, "d 3 3"]
     features: Float[Array, "d f"]
@@ -49,7 +54,7 @@ class Reference:
 
 def make_reference(
     demonstrations: Sequence[Demonstration],
-    hands: Sequence[RigidHand],
+    hands: Sequence[RigidHand | Body],
     *,
     grip_force: float | None,
     gains: Gains,
@@ -82,7 +87,7 @@ def make_reference(
         targets=targets,
         controls=anticipated(targets, gains, demonstrations[0].motion.fps) + grip,
         grip=grip,
-        tips=jnp.asarray(_tips(demonstrations, hands, frames), jnp.float32),
+        tips=jnp.asarray(_tips(demonstrations, hands, targets), jnp.float32),
         object_pose=jnp.asarray(np.stack(poses), jnp.float32),
         base=jnp.asarray(np.stack(bases), jnp.float32),
         features=jnp.asarray(features, jnp.float32),
@@ -91,7 +96,10 @@ def make_reference(
 
 
 def cached_reference(
-    demonstrations: Sequence[Demonstration], hands: Sequence[RigidHand], grip_force: float | None, gains: Gains
+    demonstrations: Sequence[Demonstration],
+    hands: Sequence[RigidHand | Body],
+    grip_force: float | None,
+    gains: Gains,
 ) -> Reference:
     """`make_reference`, kept on disk."""
 
@@ -99,19 +107,23 @@ def cached_reference(
         made = make_reference(demonstrations, hands, grip_force=grip_force, gains=gains)
         return {field.name: np.asarray(getattr(made, field.name)) for field in dataclasses.fields(made)}
 
-    bare = [without_meshes(hand) for hand in hands]
+    bare = [_ingredient(hand) for hand in hands]
     arrays = cached(compute, list(demonstrations), bare, grip_force, dataclasses.astuple(gains))
     return Reference(**{name: jnp.asarray(array) for name, array in arrays.items()})
 
 
 def grip_table(
     demonstrations: Sequence[Demonstration],
-    hands: Sequence[RigidHand],
-    targets: Float[Array, "d t 26"],
+    hands: Sequence[RigidHand | Body],
+    targets: Float[Array, "d t u"],
     forces: Float[np.ndarray, "d"],
     gains: Gains,
-) -> Float[Array, "d t 26"]:
+) -> Float[Array, "d t u"]:
     """The grip (m, rad) of each demonstration at a force (N); NaN leaves it as it is."""
+    people = _people(hands)
+    if people is None:
+        bodies = [body_of(hand) for hand in hands]
+        return jnp.asarray(model_grips(demonstrations, bodies, np.asarray(targets, float), forces, gains), jnp.float32)
     frames = targets.shape[1]
     relative = [[_padded(rows, frames) for rows in object_in_hand(d)] for d in demonstrations]
     rotation = jnp.asarray(np.stack([r for r, _ in relative]), jnp.float32)
@@ -121,7 +133,7 @@ def grip_table(
         rows = np.array([k for k, d in enumerate(demonstrations) if d.object.kind == kind and forces[k] >= 0], int)
         if rows.size:
             seen = (targets[rows, :, NUM_WRIST:], rotation[rows], position[rows])
-            chosen = [demonstrations[k].object for k in rows], [hands[k] for k in rows]
+            chosen = [demonstrations[k].object for k in rows], [people[k] for k in rows]
             grip = grip.at[rows, :, NUM_WRIST:].set(_grips(kind, *seen, *chosen, forces[rows], gains))
     return grip
 
@@ -135,19 +147,27 @@ def object_in_hand(demonstration: Demonstration) -> tuple[Float[np.ndarray, "t 3
 
 
 def _tips(
-    demonstrations: Sequence[Demonstration], hands: Sequence[RigidHand], frames: int
-) -> Float[np.ndarray, "d {frames} 5 3"]:
+    demonstrations: Sequence[Demonstration],
+    hands: Sequence[RigidHand | Body],
+    targets: Float[Array, "d t u"],
+) -> Float[np.ndarray, "d t tips 3"]:
     """Where demonstrations have their finger tips (m, world)."""
+    people, frames = _people(hands), targets.shape[1]
+    if people is None:
+        bodies = [body_of(hand) for hand in hands]
+        told = hand_coordinates(body_model(bodies[0]), np.asarray(targets, float))
+        rows = zip(demonstrations, bodies, told, strict=True)
+        return np.stack([model_places(body, own)[1] @ base_rotation(d).T for d, body, own in rows])
     motions = [d.motion for d in demonstrations]
     angles = jnp.asarray(np.stack([_padded(m.angles, frames) for m in motions]), jnp.float32)
-    tips = np.asarray(jax.jit(jax.vmap(finger_tips))(angles, stack_hands(hands)))
+    tips = np.asarray(jax.jit(jax.vmap(finger_tips))(angles, stack_hands(people)))
     turns = (Rotation.from_quat(m.wrist_quaternion, scalar_first=True).as_matrix() for m in motions)
     wrist = np.stack([_padded(rotation, frames) for rotation in turns])
     place = np.stack([_padded(m.wrist_position, frames) for m in motions])
     return np.einsum("dtij,dtfj->dtfi", wrist, tips) + place[:, :, None]
 
 
-def anticipated(targets: Float[Array, "d t 26"], gains: Gains, fps: float) -> Float[Array, "d t 26"]:
+def anticipated(targets: Float[Array, "d t u"], gains: Gains, fps: float) -> Float[Array, "d t u"]:
     """Targets led by the controllers' lag times the targets' speed.
 
     A position controller with damping follows a moving target kv/kp seconds late. A frame's target is commanded for the
@@ -161,14 +181,14 @@ def anticipated(targets: Float[Array, "d t 26"], gains: Gains, fps: float) -> Fl
 
 def _grips(
     kind: str,
-    angles: Float[Array, "n t 20"],
+    angles: Float[Array, "n t j"],
     rotation: Float[Array, "n t 3 3"],
     position: Float[Array, "n t 3"],
     objects: Sequence[ObjectDescription],
     hands: Sequence[RigidHand],
     forces: Float[np.ndarray, "n"],
     gains: Gains,
-) -> Float[Array, "n t 20"]:
+) -> Float[Array, "n t j"]:
     """Grip offsets (rad) of demonstrations whose objects are of one kind; where each object is in the hand's frame."""
 
     @jax.jit
@@ -192,6 +212,18 @@ def _grip_forces(demonstrations: Sequence[Demonstration], grip_force: float | No
             "press; give task.grip_force, in newtons"
         )
     return np.array([grasp_type(d.grasp).grip_force for d in demonstrations])
+
+
+def _people(hands: Sequence[RigidHand | Body]) -> list[RigidHand] | None:
+    """The human hands that these are, whose kinematics JAX knows; None where one is another body."""
+    people = [body_of(hand).rigid for hand in hands]
+    return None if None in people else [person for person in people if person is not None]
+
+
+def _ingredient(hand: RigidHand | Body) -> object:
+    """What a hand's part of the reference follows from."""
+    rigid = body_of(hand).rigid
+    return model_bytes(body_model(body_of(hand))) if rigid is None else without_meshes(rigid)
 
 
 def _one_of_kinds(demonstration: Demonstration) -> list[float]:

@@ -15,10 +15,9 @@ from scipy.spatial.transform import Rotation
 
 from envs.physics.solver import gauss_seidel
 from envs.reference import Reference
-from envs.scene import NUM_WRIST, OBJECT
-from mjx_hand.hand.joints import NUM_HINGES
+from envs.scene import OBJECT
+from mjx_hand.bodies.coordinates import hand_coordinates
 
-_NUM_TARGETS = NUM_WRIST + NUM_HINGES
 _HEAVIER = 300.0
 
 
@@ -27,12 +26,17 @@ def assisted_replay(
 ) -> tuple[Float[np.ndarray, "d t nq"], Float[np.ndarray, "d t nv"], Float[np.ndarray, "d t nu"]]:
     """qpos, qvel and controls at every frame. Frame 0 is the demonstration's own start, at rest, without offsets.
 
+    Args:
+        models: the scene of each demonstration.
+        reference: the demonstrations.
+        substeps: physics steps a control step.
+
     Runs on MuJoCo's C engine whatever engine trains: it is quick, and done once.
     """
     targets = np.asarray(reference.targets, float)
     pose = np.asarray(reference.object_pose, float)
-    count, frames = targets.shape[:2]
-    low, high = models[0].actuator_ctrlrange[:_NUM_TARGETS].T
+    count, frames, told = targets.shape
+    low, high = models[0].actuator_ctrlrange[:told].T
     controls = np.clip(np.asarray(reference.controls, float), low, high)
     speed = _object_speed(pose, models[0].opt.timestep * substeps)
 
@@ -42,12 +46,14 @@ def assisted_replay(
     qpos = np.zeros((count, frames, models[0].nq))
     qvel = np.zeros((count, frames, models[0].nv))
     now, moving = worlds.bind("qpos"), worlds.bind("qvel")
-    now[:, :_NUM_TARGETS], now[:, _NUM_TARGETS:] = targets[:, 0], pose[:, 0]
+    first = hand_coordinates(models[0], targets[:, 0])
+    hand = first.shape[1]
+    now[:, :hand], now[:, hand:] = first, pose[:, 0]
     qpos[:, 0] = now
     for t in range(1, frames):
-        worlds.bind("ctrl")[:, :_NUM_TARGETS] = controls[:, t]
+        worlds.bind("ctrl")[:, :told] = controls[:, t]
         worlds.step(nstep=substeps)
-        now[:, _NUM_TARGETS:], moving[:, _NUM_TARGETS:] = pose[:, t], speed[:, t]
+        now[:, hand:], moving[:, hand:] = pose[:, t], speed[:, t]
         qpos[:, t], qvel[:, t] = now, moving
     return qpos, qvel, controls
 

@@ -22,8 +22,8 @@ class TrackedStep:
     Attributes:
         position, rotation: the object's distance (m) and angle (rad) from its reference.
         position_alpha, rotation_alpha: the task's sharpness for them (1/m, 1/rad).
-        hinges, hinges_reference: hinge angles (rad).
-        tips, tips_reference: finger tips in the world (m), in the order of `hand.joints.FINGERS`.
+        hinges, hinges_reference: values of the hand's actuated joints (rad).
+        tips, tips_reference: finger tips in the world (m), in the order of the hand's fingers.
         action: what the policy did, from -1 to 1.
         change: of the filtered action, residual over its scale, since the step before.
     """
@@ -32,12 +32,12 @@ class TrackedStep:
     rotation: Float[Array, ""]
     position_alpha: float
     rotation_alpha: float
-    hinges: Float[Array, "20"]
-    hinges_reference: Float[Array, "20"]
-    tips: Float[Array, "5 3"]
-    tips_reference: Float[Array, "5 3"]
-    action: Float[Array, "26"]
-    change: Float[Array, "26"]
+    hinges: Float[Array, "j"]
+    hinges_reference: Float[Array, "j"]
+    tips: Float[Array, "tips 3"]
+    tips_reference: Float[Array, "tips 3"]
+    action: Float[Array, "u"]
+    change: Float[Array, "u"]
 
 
 Value = Callable[[TrackedStep], Float[Array, ""]]

@@ -1,4 +1,4 @@
-"""The twin's scene: the rigid hand on an actuated wrist, an object, boxes that hold it up, and a table."""
+"""The twin's scene: a hand on an actuated wrist, an object, boxes that hold it up, and a table."""
 
 from collections.abc import Sequence
 
@@ -8,10 +8,12 @@ from jaxtyping import Float
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
+from mjx_hand.bodies.body import NUM_WRIST as NUM_WRIST
+from mjx_hand.bodies.body import Body
+from mjx_hand.bodies.human_body import body_of
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.objects.description import OBJECT_KINDS, ObjectDescription
-from mjx_hand.rigid.export.mjcf import hand_spec
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand
 
@@ -20,7 +22,6 @@ OBJECT, SUPPORT, TABLE, SPARE = "object", "support", "table", "spare"
 # Of the hand with the object, and again of the object with the ground: the deepest contacts, the nearest pairs. A fist
 # around a handle has 13 of each, the other types fewer.
 MJX_CAPS = {"max_contact_points": 16, "max_geom_pairs": 16}
-NUM_WRIST = 6  # actuated wrist joints, before the hinges in qpos and ctrl
 
 # Who meets whom: (contype, conaffinity). The hand meets the object alone; the object also boxes and table. Spare boxes
 # meet nobody; without a contype MuJoCo would leave them out of its trees, whose sizes must agree.
@@ -34,7 +35,7 @@ _GEOM = {
 
 
 def scene_spec(
-    rigid: RigidHand,
+    hand: RigidHand | Body,
     description: ObjectDescription,
     support: Float[np.ndarray, "b 3"],
     support_position: Float[np.ndarray, "b 3"],
@@ -45,16 +46,17 @@ def scene_spec(
     spare: int = 0,
     assisted: bool = False,
 ) -> mujoco.MjSpec:
-    """The scene. Compiled, its qpos is the wrist's 3 slides (m) and 3 turns (rad), 20 hinges, the object's free joint.
+    """The scene. Compiled, its qpos is the wrist's 3 slides (m) and 3 turns (rad), the hand's
+    joints, the object's free joint.
 
     Args:
-        rigid: the hand.
+        hand: a person's, or any body.
         description: of the object.
         support, support_position: half extents and centres (m, world) of the boxes that hold the object up, if it does
             not stand on the table.
         base_rotation: world_from_base; the wrist's slides run along the base's axes and its turns start from it, so
             that they stay far from the Euler angles' singularity for a demonstration that starts near it.
-        gains: of the hand's joints.
+        gains: of the hand's joints; its own if None.
         visual: with the hand's meshes, for pictures; without them the model is small and quick.
         spare: how many boxes to add that touch nothing.
         assisted: with six motors on the object, after the hand's actuators: a force (N, world axes) and a torque (N m,
@@ -62,7 +64,7 @@ def scene_spec(
     """
     if description.kind not in OBJECT_KINDS:
         raise InputError(f"object kind {description.kind!r} is not known; valid: {', '.join(OBJECT_KINDS)}")
-    spec = hand_spec(rigid, base="actuated", visual=visual, gains=gains)
+    spec = body_of(hand).spec(gains, visual)
     spec.option.timestep = TIMESTEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
@@ -138,7 +140,7 @@ def base_rotation(demonstration: Demonstration) -> Float[np.ndarray, "3 3"]:
 
 def demonstration_spec(
     demonstration: Demonstration,
-    hand: RigidHand,
+    hand: RigidHand | Body,
     *,
     gains: Gains | None = None,
     visual: bool = False,
@@ -161,7 +163,7 @@ def demonstration_spec(
 
 def demonstration_model(
     demonstration: Demonstration,
-    hand: RigidHand,
+    hand: RigidHand | Body,
     *,
     gains: Gains | None = None,
     visual: bool = False,
@@ -181,7 +183,7 @@ def spare_boxes(demonstrations: Sequence[Demonstration]) -> list[int]:
 
 def demonstration_models(
     demonstrations: Sequence[Demonstration],
-    hands: Sequence[RigidHand],
+    hands: Sequence[RigidHand | Body],
     *,
     gains: Gains | None = None,
     assisted: bool = False,

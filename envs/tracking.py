@@ -28,9 +28,10 @@ from envs.scene import NUM_WRIST, OBJECT, demonstration_models
 from envs.task import Task
 from envs.twin import Tables, Twin, twin_of
 from envs.varied_scene import varied_models
+from mjx_hand.bodies.body import Body
+from mjx_hand.bodies.human_body import check_one_kind
 from mjx_hand.errors import InputError
 from mjx_hand.files.array_cache import cached, model_bytes
-from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand
@@ -43,22 +44,22 @@ _TAIL = 10  # no episode starts in a demonstration's last frames, where nothing 
 class TrackingEnv(Env):
     """One world; `jax.vmap` it for many. Brax's `State` carries a `Twin` as its pipeline state.
 
-    Actions are 26 numbers in [-1, 1], residuals of the wrist's 3 slides and 3 turns and of the 20 hinges.
+    Actions are numbers in [-1, 1], residuals of the wrist's 3 slides and 3 turns and of the hand's actuated joints.
 
     Args:
         demonstrations: what to track; the i-th runs on the i-th hand.
-        hands: the twin's hand for each demonstration, built from the person's fitted shape.
+        hands: the twin's hand for each demonstration: built from the person's fitted shape, or a robot's `Body`.
         engine: "auto", "native", "mjx" or "warp".
         task: rewards, residual ranges, resets.
-        gains: of the hand's position controllers.
+        gains: of the hand's position controllers; the hand's own if None.
         randomize: what disturbs its episodes; None for nothing.
 
     Attributes:
         demonstrations, hands: what it was built over.
+        body: of what kind the hands are; the first one's.
         gains: of the hand's position controllers.
         models: MuJoCo's of each demonstration's scene, undisturbed.
-        variations: how the engine's scenes differ from these, for each demonstration; one that differs in nothing
-            without disturbances.
+        variations: how the engine's scenes differ from these, for each demonstration; one, in nothing, undisturbed.
         tables: what it looks up; `with_tables` puts another set's in their place.
 
     Raises:
@@ -68,7 +69,7 @@ class TrackingEnv(Env):
     def __init__(
         self,
         demonstrations: Sequence[Demonstration],
-        hands: Sequence[RigidHand],
+        hands: Sequence[RigidHand | Body],
         engine: str = "auto",
         task: Task | None = None,
         gains: Gains | None = None,
@@ -76,13 +77,13 @@ class TrackingEnv(Env):
     ):
         self.demonstrations, self.hands = tuple(demonstrations), tuple(hands)
         self.task = Task() if task is None else task
-        self.gains = gains = Gains() if gains is None else gains
+        self.body = check_one_kind(hands)
+        self.gains = gains = self.body.gains if gains is None else gains
         reference = cached_reference(demonstrations, hands, self.task.grip_force, gains)
         self.assisted = self.task.assist > 0
         self.randomize = randomize
-        self.models = demonstration_models(
-            demonstrations, hands, gains=gains, assisted=self.assisted or randomize is not None
-        )
+        motors = self.assisted or randomize is not None
+        self.models = demonstration_models(demonstrations, hands, gains=gains, assisted=motors)
         self.variations = draw_variations(randomize or Randomize.only(), len(self.demonstrations), _VARIATION_SEED)
         scenes = self.models
         if randomize is not None:
@@ -95,14 +96,14 @@ class TrackingEnv(Env):
                 f"demonstrations at {self.fps:g} frames/s do not fit control steps of {self.dt * 1000:g} ms; "
                 f"resample them to {1 / self.dt:g} frames/s"
             )
-        low, high = self.models[0].actuator_ctrlrange[: self.action_size].T
+        limits = jnp.asarray(self.models[0].actuator_ctrlrange[: self.action_size], jnp.float32)
         starts = self._start_table(reference)
         self.tables = Tables(
             reference=reference,
             starts=starts,
             inertia=jnp.array([[m.body(OBJECT).mass[0], m.body(OBJECT).inertia.mean()] for m in self.models]),
-            low=jnp.asarray(low, jnp.float32),
-            high=jnp.asarray(high, jnp.float32),
+            low=limits[:, 0],
+            high=limits[:, 1],
             engine=self.engine.tables,
             disturbances=randomize
             and disturbance_tables(
@@ -134,8 +135,8 @@ class TrackingEnv(Env):
 
     @property
     def action_size(self) -> int:
-        """How many numbers an action has: the residuals of six wrist joints and 20 hinges."""
-        return NUM_WRIST + NUM_HINGES
+        """How many numbers an action has: the residuals of six wrist joints and of the hand's."""
+        return self.body.num_targets
 
     @property
     def observation_size(self) -> int:
@@ -151,8 +152,7 @@ class TrackingEnv(Env):
         """A training episode: a random demonstration, in its middle with probability `task.random_start_prob`."""
         which, whether, where = jax.random.split(rng, 3)
         demonstration = jax.random.randint(which, (), 0, self.num_demonstrations)
-        last = jnp.maximum(self.reference.length[demonstration] - _TAIL, 1)
-        frame = jax.random.randint(where, (), 0, last)
+        frame = jax.random.randint(where, (), 0, jnp.maximum(self.reference.length[demonstration] - _TAIL, 1))
         frame = jnp.where(jax.random.bernoulli(whether, self.task.random_start_prob), frame, 0)
         return self.start(demonstration, frame, jax.random.fold_in(rng, 0))
 
@@ -183,7 +183,7 @@ class TrackingEnv(Env):
         info = {"truncation": zero, "progress": jnp.ones(())}
         return State(twin, self._observe(twin), zero, zero, metrics, info)  # type: ignore[call-arg]
 
-    def step(self, state: State, action: Float[Array, "26"]) -> State:
+    def step(self, state: State, action: Float[Array, "u"]) -> State:
         """One control step towards the next frame of the demonstration; past its end the last frame is held.
 
         `state.info["progress"]` is the share of the training that is over; 1, without help for the object, unless the
@@ -220,11 +220,13 @@ class TrackingEnv(Env):
         )
 
     def command(
-        self, twin: Twin, action: Float[Array, "26"]
-    ) -> tuple[Int[Array, ""], Float[Array, "26"], Float[Array, "26"]]:
+        self, twin: Twin, action: Float[Array, "u"]
+    ) -> tuple[Int[Array, ""], Float[Array, "u"], Float[Array, "u"]]:
         """The next frame, the residual there, and what the actuators are told on the way (m, rad)."""
         task = self.task
-        residual = task.smoothing * twin.residual + (1 - task.smoothing) * residual_scale(task) * action
+        residual = (
+            task.smoothing * twin.residual + (1 - task.smoothing) * residual_scale(task, self.body.names) * action
+        )
         frame = jnp.minimum(twin.frame + 1, self.reference.length[twin.demonstration] - 1)
         target = self.reference.controls[twin.demonstration, frame] + residual
         return frame, residual, jnp.clip(target, self.tables.low, self.tables.high)
@@ -236,7 +238,8 @@ class TrackingEnv(Env):
         mass, inertia = self.tables.inertia[twin.demonstration]
         poses = self.reference.object_pose[twin.demonstration]
         now, wanted = poses[twin.frame], poses[frame]
-        object_pose, speed = twin.physics.qpos[self.action_size :], twin.physics.qvel[self.action_size :]
+        first = self.body.num_coordinates
+        object_pose, speed = twin.physics.qpos[first:], twin.physics.qvel[first:]
         moving = (wanted[:3] - now[:3]) * self.fps
         turn = quaternion_difference(object_pose[3:], wanted[3:])
         turning = quaternion_difference(now[3:], wanted[3:]) * self.fps
@@ -247,10 +250,10 @@ class TrackingEnv(Env):
     def _observe(self, twin: Twin) -> Float[Array, "o"]:
         physics, tables = twin.physics, self.tables.disturbances
         if twin.episode is not None and tables is not None:
-            n = self.action_size
+            n = self.body.num_coordinates
             seen = seen_pose(twin.episode, tables.episode, twin.frame, physics.qpos[n:])
             physics = dataclasses.replace(physics, qpos=jnp.concatenate([physics.qpos[:n], seen]))
-        return observe(self.reference, self.task, twin.demonstration, twin.frame, physics, twin.residual)
+        return observe(self.reference, self.task, self.body, twin.demonstration, twin.frame, physics, twin.residual)
 
     def _tracked(self, twin: Twin, position: Array, rotation: Array, action: Array, moved: Array) -> TrackedStep:
         """What the reward is counted from; `moved` is how far the residual went in this step."""
@@ -260,18 +263,18 @@ class TrackingEnv(Env):
             rotation=rotation,
             position_alpha=self.task.reward_position_alpha,
             rotation_alpha=self.task.reward_rotation_alpha,
-            hinges=twin.physics.qpos[NUM_WRIST : self.action_size],
+            hinges=self.body.of_targets(twin.physics.qpos)[NUM_WRIST:],
             hinges_reference=self.reference.targets[place][NUM_WRIST:],
-            tips=twin.physics.sensordata.reshape(5, 3),
+            tips=twin.physics.sensordata.reshape(-1, 3),
             tips_reference=self.reference.tips[place],
             action=action,
-            change=moved / residual_scale(self.task),
+            change=moved / residual_scale(self.task, self.body.names),
         )
 
     def _errors(self, twin: Twin) -> tuple[Array, Array]:
         """The object's distance (m) and angle (rad) from where the demonstration has it."""
         pose = self.reference.object_pose[twin.demonstration, twin.frame]
-        object_pose = twin.physics.qpos[NUM_WRIST + NUM_HINGES :]
+        object_pose = twin.physics.qpos[self.body.num_coordinates :]
         turn = quaternion_difference(pose[3:], object_pose[3:])
         return jnp.linalg.norm(object_pose[:3] - pose[:3]), jnp.sqrt(jnp.sum(turn**2) + 1e-12)
 

@@ -22,7 +22,7 @@ class Twin:
     physics: PhysicsState
     demonstration: Int[Array, "*b"]
     frame: Int[Array, "*b"]
-    residual: Float[Array, "*b 26"]
+    residual: Float[Array, "*b u"]
     episode: Episode | None = None
 
 
@@ -44,8 +44,8 @@ class Tables:
     reference: Reference
     starts: PhysicsState
     inertia: Float[Array, "d 2"]
-    low: Float[Array, "26"]
-    high: Float[Array, "26"]
+    low: Float[Array, "u"]
+    high: Float[Array, "u"]
     engine: Any
     disturbances: DisturbanceTables | None = None
 

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from envs.disturbances.variation import Variation, varied_gains, varied_object
 from envs.scene import SUPPORT, demonstration_spec, spare_boxes
+from mjx_hand.bodies.body import Body
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand
@@ -16,7 +17,7 @@ from mjx_hand.rigid.rigid_hand import RigidHand
 
 def varied_model(
     demonstration: Demonstration,
-    hand: RigidHand,
+    hand: RigidHand | Body,
     variation: Variation,
     gains: Gains,
     *,
@@ -50,7 +51,7 @@ def varied_model(
 
 def varied_models(
     demonstrations: Sequence[Demonstration],
-    hands: Sequence[RigidHand],
+    hands: Sequence[RigidHand | Body],
     variations: Sequence[Sequence[Variation]],
     gains: Gains,
 ) -> list[mujoco.MjModel]:

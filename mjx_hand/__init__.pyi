@@ -1,3 +1,7 @@
+from mjx_hand.bodies.body import Body as Body
+from mjx_hand.bodies.human_body import human_body as human_body
+from mjx_hand.bodies.robot_body import robot_body as robot_body
+from mjx_hand.bodies.write_robot import write_robot as write_robot
 from mjx_hand.capture.keypoint_files.load_keypoints import load_keypoints as load_keypoints
 from mjx_hand.capture.keypoint_fit.fit import fit_keypoints as fit_keypoints
 from mjx_hand.capture.keypoints.recording import KeypointRecording as KeypointRecording

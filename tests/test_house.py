@@ -20,6 +20,7 @@ FLOORS = (
     ("mjx_hand.__main__",),
     ("mjx_hand.cli",),
     ("mjx_hand.view",),
+    ("mjx_hand.bodies",),
     ("mjx_hand.retarget", "mjx_hand.robots"),
     ("mjx_hand.capture", "mjx_hand.projection"),
     ("mjx_hand.rigid",),

@@ -6,6 +6,7 @@ with the project, on the demonstration beside it, where there is one. `play.unst
 diverged in training instead: the state before the step, and each physics step of it that the engine could make.
 """
 
+from mjx_hand.bodies.human_body import person
 from mjx_hand.errors import InputError
 from mjx_hand.view.browser.viewer import Viewer
 from train.experiment.bundled_policies import bundled_env, with_policy
@@ -58,7 +59,7 @@ def rollout_viewer(config: Config) -> Viewer:
         raise InputError(f"play.demonstration is {index}; there are {len(errors)}, numbered from 0")
     outcome = scores.failure[index] or "followed to the end"
     title = f"{config.name} {index}: {outcome}, {errors[index]:.2f} cm"
-    scene = rollout_scene(env.demonstrations[index], rollouts, index, env.hands[index], title)
+    scene = rollout_scene(env.demonstrations[index], rollouts, index, person(env.hands[index]), title)
     return Viewer(scene, config.play.port)
 
 

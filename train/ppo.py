@@ -196,7 +196,8 @@ class _Run:
     def _check(self, writer: SummaryWriter, params: Networks, steps: int) -> None:
         """All training demonstrations from frame 0; keeps the best policy, because curves are not monotone."""
         began = time.monotonic()
-        scores = evaluate(self.roll_out(params.policy), [d.object for d in self.env.demonstrations]).rows()
+        objects = [d.object for d in self.env.demonstrations]
+        scores = evaluate(self.roll_out(params.policy), objects, self.env.body.palm).rows()
         point = Point(
             steps=steps,
             seconds=time.monotonic() - self.start,

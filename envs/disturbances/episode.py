@@ -54,7 +54,7 @@ class Episode:
     """
 
     delay: Int[Array, "*b"]
-    waiting: Float[Array, "*b w 26"]
+    waiting: Float[Array, "*b w u"]
     seen_offset: Float[Array, "*b 6"]
     push: Float[Array, "*b 3"]
     push_start: Int[Array, "*b"]
@@ -85,7 +85,7 @@ def _held(pose: Float[np.ndarray, "_ 7"], steps: int) -> tuple[int, int]:
 
 
 def draw_episode(
-    tables: EpisodeTables, demonstration: Int[Array, ""], control: Float[Array, "26"], key: Array
+    tables: EpisodeTables, demonstration: Int[Array, ""], control: Float[Array, "u"], key: Array
 ) -> Episode:
     """An episode of a demonstration; `control` (m, rad) is what the actuators were told so far."""
     keys = jax.random.split(key, 10)
@@ -107,7 +107,7 @@ def draw_episode(
     )
 
 
-def delayed(episode: Episode, targets: Float[Array, "26"]) -> tuple[Episode, Float[Array, "26"]]:
+def delayed(episode: Episode, targets: Float[Array, "u"]) -> tuple[Episode, Float[Array, "u"]]:
     """The episode with these targets on their way, and those that arrive now, `delay` control steps later."""
     sent = jnp.concatenate([targets[None], episode.waiting])
     return dataclasses.replace(episode, waiting=sent[:-1]), sent[episode.delay]

@@ -45,8 +45,8 @@ class ConstantPress:
 
     env: TrackingEnv
     full: Mapping[str, float | None]
-    contact: Float[Array, "d t 26"]
-    press: Float[Array, "d t 26"]
+    contact: Float[Array, "d t u"]
+    press: Float[Array, "d t u"]
 
     def tables(self, strengths: Mapping[str, float]) -> Tables:
         """The environment's tables with controls that press with these shares of full strength, by type.
@@ -104,7 +104,7 @@ def search_press(env: TrackingEnv, hold: float) -> dict[str, float]:
         scores = []
         for share in SHARES:
             rollouts = roll_out(None, press.tables(dict.fromkeys(press.full, share)))
-            found = evaluate(rollouts, [d.object for d in env.demonstrations]).scores
+            found = evaluate(rollouts, [d.object for d in env.demonstrations], env.body.palm).scores
             scores.append(np.mean([found[name] for name in _JUDGED_BY if name in found], axis=0))
         return {"scores": np.array(scores)}
 
@@ -123,7 +123,10 @@ def _full(demonstration: Demonstration, env: TrackingEnv) -> float | None:
     if demonstration.grasp not in grasp_names():
         return _UNKNOWN_FULL * (env.task.grip_force or 1.0)
     closing = grasp_type(demonstration.grasp).closing
-    return closing.force if isinstance(closing, Pads) else None
+    if isinstance(closing, Pads):
+        return closing.force
+    # The torques of a wrap are those of human hinges; another hand presses with a force on every link that touches.
+    return None if env.body.rigid is not None else _UNKNOWN_FULL * (env.task.grip_force or 1.0)
 
 
 def _ramp(demonstration: Demonstration, frames: int) -> Float[np.ndarray, "{frames}"]:

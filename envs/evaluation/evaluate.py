@@ -9,7 +9,9 @@ from jaxtyping import Bool, Int, Shaped
 from envs.evaluation import metrics
 from envs.evaluation.failure import FAILURES, failure_reasons
 from envs.evaluation.rollout import Rollouts
+from mjx_hand.bodies.human_body import HUMAN_PALM
 from mjx_hand.errors import InputError
+from mjx_hand.hand.joints import FINGERS, LINKS
 from mjx_hand.objects.description import ObjectDescription
 
 
@@ -45,12 +47,15 @@ class Evaluation:
         return {reason: self.failure.count(reason) / len(self.failure) for reason in FAILURES}
 
 
-def evaluate(rollouts: Rollouts, objects: Sequence[ObjectDescription]) -> Evaluation:
+def evaluate(
+    rollouts: Rollouts, objects: Sequence[ObjectDescription], palm: tuple[int, int, int] = HUMAN_PALM
+) -> Evaluation:
     """Score rollouts by every metric.
 
     Args:
         rollouts: n rollouts; `hold` is scored where any has `held` frames and any object is to end raised.
         objects: each demonstration's object, by the numbers in `rollouts.demonstration`.
+        palm: three of the joint centres that span the palm (`Body.palm`).
 
     Raises:
         InputError: no rollouts, a rollout without counted frames or with NaN in one, a demonstration without an object,
@@ -61,13 +66,13 @@ def evaluate(rollouts: Rollouts, objects: Sequence[ObjectDescription]) -> Evalua
     scores = {
         "manip_trans_object": success,
         "manip_trans_full": metrics.manip_trans_full(rollouts),
-        "manip_trans_frames": metrics.manip_trans_frames(rollouts),
+        **({"manip_trans_frames": metrics.manip_trans_frames(rollouts)} if _is_human(rollouts) else {}),
         "spider": metrics.spider(rollouts),
         "chord": metrics.chord(rollouts),
         "add_auc": metrics.add_auc(rollouts, objects),
     }
     if rollouts.held.any() and (metrics.final_rise(rollouts) >= metrics.RAISED).any():
-        scores["hold"] = metrics.hold(rollouts)
+        scores["hold"] = metrics.hold(rollouts, palm)
     scores["kept"] = scores["chord"] & scores.get("hold", True)
     turned, moving = np.rad2deg(metrics.rotation_error(rollouts)), metrics.moving(rollouts)
     scores |= {
@@ -79,6 +84,11 @@ def evaluate(rollouts: Rollouts, objects: Sequence[ObjectDescription]) -> Evalua
         "tip_error_cm": 100 * metrics.over_counted(metrics.tip_error(rollouts), rollouts),
     }
     return Evaluation(demonstration=rollouts.demonstration, scores=scores, failure=failure_reasons(rollouts, success))
+
+
+def _is_human(rollouts: Rollouts) -> bool:
+    """Whether joint centres and tips are those of MANO's layout, which some bounds are given for one by one."""
+    return (rollouts.joints.shape[2], rollouts.tips.shape[2]) == (len(LINKS), len(FINGERS))
 
 
 def _check(rollouts: Rollouts, num_objects: int) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from envs.evaluation.rollout import Rollouts
+from mjx_hand.bodies.human_body import HUMAN_PALM
 from mjx_hand.errors import InputError
 from mjx_hand.objects.description import ObjectDescription
 from mjx_hand.objects.surface_points import surface_points
@@ -30,7 +31,6 @@ ADD_POINTS = 500
 HOLD_SECONDS, HOLD_SLIP = 5.0, 0.02
 RAISED = 0.02  # m above its start from which an object counts as lifted
 
-_WRIST, _INDEX_KNUCKLE, _PINKY_KNUCKLE = 0, 1, 7  # three points of the palm, in the order of `hand.joints.LINKS`
 _FIRST = [1, 4, 7, 10, 13]  # the fingers' first joints; the others are those beyond
 _BEYOND = [2, 3, 5, 6, 8, 9, 11, 12, 14, 15]
 
@@ -46,12 +46,12 @@ def rotation_error(rollouts: Rollouts) -> Float[np.ndarray, "n t"]:
 
 
 def joint_error(rollouts: Rollouts) -> Float[np.ndarray, "n t"]:
-    """Mean distance (m) of the 16 joint centres from the demonstrated ones, frame by frame."""
+    """Mean distance (m) of the joint centres from the demonstrated ones, frame by frame."""
     return np.linalg.norm(rollouts.joints - rollouts.joints_reference, axis=-1).mean(axis=-1)
 
 
 def tip_error(rollouts: Rollouts) -> Float[np.ndarray, "n t"]:
-    """Mean distance (m) of the 5 finger tips from the demonstrated ones, frame by frame."""
+    """Mean distance (m) of the finger tips from the demonstrated ones, frame by frame."""
     return np.linalg.norm(rollouts.tips - rollouts.tips_reference, axis=-1).mean(axis=-1)
 
 
@@ -120,7 +120,7 @@ def spider(rollouts: Rollouts) -> Bool[np.ndarray, "n"]:
 
 def chord(rollouts: Rollouts) -> Bool[np.ndarray, "n"]:
     """CHORD: no counted frame reaches 10 cm or 0.5 rad of object error, or 15 cm of wrist error."""
-    wrist = np.linalg.norm(rollouts.joints[:, :, _WRIST] - rollouts.joints_reference[:, :, _WRIST], axis=-1)
+    wrist = np.linalg.norm(rollouts.joints[:, :, 0] - rollouts.joints_reference[:, :, 0], axis=-1)
     good = (position_error(rollouts) < CHORD["translation"]) & (rotation_error(rollouts) < CHORD["rotation"])
     return (good & (wrist < CHORD["wrist"]) | ~rollouts.counted).all(axis=1)
 
@@ -147,12 +147,16 @@ def add_auc(rollouts: Rollouts, objects: Sequence[ObjectDescription]) -> Float[n
     return area
 
 
-def hold(rollouts: Rollouts) -> Bool[np.ndarray, "n"]:
+def hold(rollouts: Rollouts, palm: tuple[int, int, int] = HUMAN_PALM) -> Bool[np.ndarray, "n"]:
     """Whether the object stays in the hand for 5 s after the demonstration, while the last target is held on.
 
     In all of these frames the object's centre, seen from the palm, is less than 2 cm from where it was in the last
     counted frame. Where the demonstration ends with the object raised (2 cm above its start), the object must also end
     raised, by at least half as much: one that still lies on the table under a hand at rest has not slipped either.
+
+    Args:
+        rollouts: n rollouts.
+        palm: three of their joint centres that span the palm: the wrist and two knuckles.
 
     Raises:
         InputError: a rollout has less than 5 s of `held` frames.
@@ -165,7 +169,7 @@ def hold(rollouts: Rollouts) -> Bool[np.ndarray, "n"]:
             f"hold needs {HOLD_SECONDS:g} s, so roll out that much longer"
         )
     rows, end = np.arange(len(rollouts.held)), last_counted(rollouts)
-    place = _seen_from_palm(rollouts)
+    place = _seen_from_palm(rollouts, palm)
     judged = rollouts.held & (np.cumsum(rollouts.held, axis=1) <= needed)
     slip = np.linalg.norm(place - place[rows, end][:, None], axis=-1)
     kept = ((slip < HOLD_SLIP) | ~judged).all(axis=1)
@@ -205,15 +209,15 @@ def _placed(points: Float[np.ndarray, "v 3"], pose: Float[np.ndarray, "t 7"]) ->
     return points + w * cross + np.cross(axis, cross) + pose[:, None, :3]
 
 
-def _seen_from_palm(rollouts: Rollouts) -> Float[np.ndarray, "n t 3"]:
+def _seen_from_palm(rollouts: Rollouts, palm: tuple[int, int, int]) -> Float[np.ndarray, "n t 3"]:
     """The object's centre in a frame fixed to the palm, which wrist and two knuckles span."""
     rows, end = np.arange(len(rollouts.counted)), last_counted(rollouts)
     used = (rollouts.counted | rollouts.held)[..., None, None]
     joints = np.where(used, rollouts.joints, rollouts.joints[rows, end][:, None])  # padding may be zeros: no frame
-    wrist = joints[:, :, _WRIST]
-    along = joints[:, :, _INDEX_KNUCKLE] - wrist
+    wrist, knuckle, other = (joints[:, :, k] for k in palm)
+    along = knuckle - wrist
     x = along / np.linalg.norm(along, axis=-1, keepdims=True)
-    normal = np.cross(x, joints[:, :, _PINKY_KNUCKLE] - wrist)
+    normal = np.cross(x, other - wrist)
     z = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-    palm = np.stack([x, np.cross(z, x), z], axis=-2)
-    return np.einsum("ntij,ntj->nti", palm, rollouts.object_pose[..., :3] - wrist)
+    axes = np.stack([x, np.cross(z, x), z], axis=-2)
+    return np.einsum("ntij,ntj->nti", axes, rollouts.object_pose[..., :3] - wrist)

@@ -7,20 +7,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from envs.evaluation.hand_places import make_hand_places
 from envs.evaluation.rollout import Rollouts
-from envs.observation import wrist_rotation
-from envs.scene import NUM_WRIST
 from envs.tracking import TrackingEnv
 from envs.twin import Tables, twin_of
-from mjx_hand.hand.joints import NUM_HINGES
-from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics, stack_hands, tip_positions
-
-_NUM_TARGETS = NUM_WRIST + NUM_HINGES
+from mjx_hand.bodies.coordinates import hand_coordinates
 
 
-def zero_residual(parameters: object, observation: Float[Array, "n o"]) -> Float[Array, "n 26"]:
-    """The policy that leaves the reference as it is: the baseline."""
-    return jnp.zeros((observation.shape[0], _NUM_TARGETS))
+def zero_residual(parameters: object, observation: Float[Array, "n o"]) -> Float[Array, "n 1"]:
+    """The policy that leaves the reference as it is, whatever the hand: the baseline."""
+    return jnp.zeros((observation.shape[0], 1))
 
 
 def make_roll_out(
@@ -38,7 +34,7 @@ def make_roll_out(
 
     Args:
         env: the environment.
-        policy: from (parameters, observations of all worlds) to actions.
+        policy: from (parameters, observations of all worlds) to actions, (n, u), or (n, 1) for the same of all joints.
         hold: how long the last target is held on after each demonstration (s).
         repeats: rollouts of each demonstration, one set after the other. They differ where an engine adds forces up in
             an order that it does not keep, as on a GPU; the native engine's are the same to the last bit.
@@ -52,7 +48,8 @@ def make_roll_out(
         given = env.with_tables(tables)
 
         def step(state, _):  # type: ignore[no-untyped-def]
-            state = jax.vmap(given.step)(state, policy(parameters, state.obs))
+            actions = jnp.broadcast_to(policy(parameters, state.obs), (len(which), env.action_size))
+            state = jax.vmap(given.step)(state, actions)
             physics = twin_of(state).physics
             return state, (physics.qpos, physics.sensordata, state.reward)
 
@@ -62,37 +59,28 @@ def make_roll_out(
         _, rest = jax.lax.scan(step, first, length=steps)
         return jax.tree.map(lambda a, b: jnp.moveaxis(jnp.concatenate([a[None], b]), 0, 1), start, rest)
 
-    @jax.jit
-    def centres(qpos: Float[Array, "n t q"], base: Float[Array, "n 3 3"], bodies: RigidHand) -> tuple[Array, Array]:
-        def one(q: Array, base: Array, hand: RigidHand) -> tuple[Array, Array]:
-            rotation = wrist_rotation(q[3:NUM_WRIST], base)
-            rot, pos = forward_kinematics(q[NUM_WRIST:_NUM_TARGETS], hand)
-            tips = tip_positions(rot, pos, hand)
-            return pos @ rotation.T + base @ q[:3], tips @ rotation.T + base @ q[:3]
-
-        return jax.vmap(lambda qs, b, h: jax.lax.map(lambda q: one(q, b, h), qs, batch_size=64))(qpos, base, bodies)
-
     # After a demonstration its last frame is the reference.
     frame = np.minimum(np.arange(steps + 1)[None], length[:, None] - 1)
     reference = np.asarray(env.reference.targets)[which[:, None], frame]
     pose = np.asarray(env.reference.object_pose)[which[:, None], frame]
-    base, bodies = env.reference.base[which], jax.tree.map(lambda leaf: leaf[which], stack_hands(env.hands))
-    wanted_joints, wanted_tips = (np.asarray(a) for a in centres(reference, base, bodies))
+    places = make_hand_places([env.hands[k] for k in which], env.reference.base[which])
+    wanted_joints, wanted_tips = places(hand_coordinates(env.models[0], reference))
+    hand = env.body.num_coordinates
     time = np.arange(steps + 1)[None]
     counted = time < length[:, None]
     held = (time >= length[:, None]) & (time < length[:, None] + round(hold * env.fps))
 
     def roll_out(parameters: object, tables: Tables | None = None) -> Rollouts:
         qpos, sensors, reward = run(parameters, env.tables if tables is None else tables)
-        joints, _ = centres(qpos[..., :_NUM_TARGETS], base, bodies)
+        joints, _ = places(qpos[..., :hand])
         return Rollouts(
             demonstration=which,
             qpos=np.asarray(qpos),
-            object_pose=np.asarray(qpos[..., _NUM_TARGETS:]),
+            object_pose=np.asarray(qpos[..., hand:]),
             object_reference=pose,
-            joints=np.asarray(joints),
+            joints=joints,
             joints_reference=wanted_joints,
-            tips=np.asarray(sensors).reshape(*sensors.shape[:2], 5, 3),
+            tips=np.asarray(sensors).reshape(*sensors.shape[:2], -1, 3),
             tips_reference=wanted_tips,
             counted=counted,
             held=held,

@@ -15,10 +15,10 @@ class Rollouts:
 
     Attributes:
         demonstration: which demonstration each rollout followed.
-        qpos: the scene's coordinates (wrist 6, hinges 20, object's free joint 7).
+        qpos: the scene's coordinates (the wrist's six, the hand's joints, the object's free joint).
         object_pose, object_reference: achieved and demonstrated.
-        joints, joints_reference: the 16 joint centres.
-        tips, tips_reference: the 5 finger tips.
+        joints, joints_reference: joint centres, the wrist first.
+        tips, tips_reference: finger tips.
         counted, held: frame masks.
         reward: of the step that led to each frame.
         fps: control rate.
@@ -28,10 +28,10 @@ class Rollouts:
     qpos: Float[np.ndarray, "n t nq"]
     object_pose: Float[np.ndarray, "n t 7"]
     object_reference: Float[np.ndarray, "n t 7"]
-    joints: Float[np.ndarray, "n t 16 3"]
-    joints_reference: Float[np.ndarray, "n t 16 3"]
-    tips: Float[np.ndarray, "n t 5 3"]
-    tips_reference: Float[np.ndarray, "n t 5 3"]
+    joints: Float[np.ndarray, "n t links 3"]
+    joints_reference: Float[np.ndarray, "n t links 3"]
+    tips: Float[np.ndarray, "n t tips 3"]
+    tips_reference: Float[np.ndarray, "n t tips 3"]
     counted: Bool[np.ndarray, "n t"]
     held: Bool[np.ndarray, "n t"]
     reward: Float[np.ndarray, "n t"]

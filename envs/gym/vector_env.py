@@ -28,7 +28,7 @@ Step = tuple[
 class TrackingVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
     """`num_envs` worlds side by side, each of which starts a new episode when its own is over.
 
-    Observations are float32 (n, o) within the limits of `observation_space`; actions (n, 26) within [-1, 1], beyond
+    Observations are float32 (n, o) within the limits of `observation_space`; actions (n, u) within [-1, 1], beyond
     which they are cut off; rewards float32 (n,). An episode terminates where the object is lost or the simulation
     diverges, and is truncated at its demonstration's end.
 
@@ -105,7 +105,7 @@ class TrackingVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         self._state, self._over = state, np.zeros(self.num_envs, bool)
         return np.array(state.obs, np.float32), _masked(_place(state), np.ones(self.num_envs, bool))
 
-    def step(self, actions: Float[np.ndarray, "n 26"]) -> Step:
+    def step(self, actions: Float[np.ndarray, "n u"]) -> Step:
         """One control step of every world.
 
         Raises:
@@ -150,7 +150,7 @@ class TrackingVectorEnv(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         tables: Tables,
         state: State,
         keys: Array,
-        actions: Float[Array, "n 26"],
+        actions: Float[Array, "n u"],
         over: Bool[Array, "n"],
         progress: Float[Array, "n"],
     ) -> tuple[State, State, Array]:

@@ -1,4 +1,4 @@
-"""`mjx-hand robot`: a recording of a person's hand onto a robot hand."""
+"""`mjx-hand robot`: a recording of a person's hand onto a robot hand, or the robot hand as a model for simulation."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -18,7 +18,7 @@ from mjx_hand.retarget.sequence import rigid_hand_of
 from mjx_hand.robots.hand_axes import check_goes_with
 from mjx_hand.robots.motion_keypoints import motion_keypoints
 from mjx_hand.robots.palm_frame import in_palm
-from mjx_hand.robots.robot_hand import load_robot, robot_objective
+from mjx_hand.robots.robot_hand import load_robot, robot_objective, urdf_of
 from mjx_hand.robots.robot_motion import RobotMotion, save_robot_motion, vector_errors
 from mjx_hand.robots.solver.kinematic_tree import KinematicTree, joint_values
 from mjx_hand.robots.solver.objectives import Objective
@@ -26,30 +26,54 @@ from mjx_hand.robots.solver.retarget_keypoints import retarget_keypoints
 
 
 def robot(
-    recording: Annotated[Path, tyro.conf.Positional],
-    urdf: Path,
+    recording: Annotated[Path | None, tyro.conf.Positional] = None,
+    *,
     robot: str,
-    out: Path,
+    urdf: Path | None = None,
+    out: Path | None = None,
+    build: Path | None = None,
     objective: Literal["vector", "dexpilot", "position"] = "vector",
     side: Literal["right", "left"] | None = None,
     sequence: str | None = None,
     fps: float | None = None,
+    collision: Literal["hulls", "capsules"] = "hulls",
+    absent_meshes: Literal["refuse", "bones"] = "refuse",
+    self_collision: bool = False,
 ) -> None:
-    """Move a robot hand as a person's hand moved.
+    """Move a robot hand as a person's hand moved; or with --build write the robot hand as a model for simulation.
 
     Args:
         recording: keypoints (.json, .npz or .csv) or a motion of any format that mjx-hand retarget reads.
-        urdf: the robot hand's URDF; its meshes are not needed.
+        urdf: the robot hand's URDF; without it the one that the description names. Its meshes are needed by --build
+            only.
         robot: its description: a name in mjx_hand/robots/descriptions, or the path of a file like those.
         out: the .npz to write: the values of all joints.
+        build: the folder to write the hand to, as MJCF with meshes, in place of moving it: on a wrist that six joints
+            move, with actuators, sites at the finger tips, ties for joints that follow others.
         objective: what follows what: vector (wrist to finger tips), dexpilot (those, and tips brought together), or
             position (links where the keypoints are, with a base that moves).
         side: which hand, where the recording holds both or does not say.
         sequence: the name of one hand or recording in the file, where there are several.
         fps: frames per second, where the recording does not say.
+        collision: what touches in the model of --build: the URDF's collision shapes, its meshes by their convex hulls,
+            or a capsule for each.
+        absent_meshes: refuse a URDF whose collision meshes are not there, or build without them, with a capsule along
+            the bone of each link that has no other shape.
+        self_collision: let the links of the model of --build meet each other, but for neighbours.
     """
+    if build is not None:
+        if recording is not None or out is not None:
+            raise InputError("--build writes the robot hand itself; give no recording and no --out with it")
+        from mjx_hand.cli.build_robot import build_robot
+
+        return build_robot(
+            robot, urdf, build, side=side, collision=collision, absent=absent_meshes, self_collision=self_collision
+        )
+    if recording is None or out is None:
+        raise InputError("give a recording and --out FILE.npz to move the robot hand, or --build FOLDER to write it")
     check_out(out, recording)
     description = load_robot(robot)
+    urdf = urdf_of(description, urdf)
     tree, wanted = robot_objective(description, urdf, objective)
     found, which = _recorded(recording, side, sequence, fps)
     found = plausible_keypoints(found, load_hand(side=which))

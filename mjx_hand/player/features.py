@@ -19,9 +19,27 @@ from jaxtyping import Float
 from mjx_hand.hand.joints import FINGERS, HINGES, WRIST_SLIDES, WRIST_TURNS
 
 OBSERVATION_LIMIT = 5.0  # of an observation
-TARGETS = (*WRIST_SLIDES, *WRIST_TURNS, *HINGES)
+WRIST = (*WRIST_SLIDES, *WRIST_TURNS)
+_NUM_WRIST = len(WRIST)
 _XYZ = ("x", "y", "z")
 _PER_LENGTH = 30.0  # 1/m, for errors of the object: 3 cm
+
+
+@dataclasses.dataclass(frozen=True)
+class HandNames:
+    """What a hand's numbers are called, in order: its actuated joints, without the wrist's, and its fingers."""
+
+    joints: tuple[str, ...] = HINGES
+    fingers: tuple[str, ...] = FINGERS
+
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """What is commanded: the wrist's slides and turns, then the joints."""
+        return (*WRIST, *self.joints)
+
+
+HUMAN = HandNames()
+TARGETS = HUMAN.targets
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,20 +50,20 @@ class Seen:
     frame is held.
 
     Attributes:
-        hand, hand_speed: (26,) coordinates and speeds of the wrist's slides and turns and of the hinges.
-        residual: (26,) the filtered residual so far.
+        hand, hand_speed: (u,) coordinates and speeds of the wrist's slides and turns and of the actuated joints.
+        residual: (u,) the filtered residual so far.
         object_pose: (7,) in the world.
         object_speed: (6,) linear in the world, angular in the object's own axes.
         object_turn: (3,) rotation vector, in the reference's own axes, that takes the reference's orientation to the
             object's.
         object_axes: (3, 3) world_from_object.
         wrist_place, wrist_axes: (3,) and (3, 3) world_from_hand.
-        tips: (5, 3) finger tips in the world.
+        tips: (fingers, 3) finger tips in the world.
         base: (3, 3) world_from_base of the scene's wrist.
-        target, grip: (26,) demonstrated coordinates, and the share of the controls that presses.
+        target, grip: (u,) demonstrated coordinates, and the share of the controls that presses.
         pose: (7,) demonstrated object.
         first_pose: (7,) of the demonstration's first frame.
-        targets_ahead, poses_ahead: (h, 26) and (h, 7) demonstrated some frames ahead.
+        targets_ahead, poses_ahead: (h, u) and (h, 7) demonstrated some frames ahead.
         phase: (1,) share of the demonstration that is over.
         object_features: size (m), mass (kg), friction, and 1 for the kind.
     """
@@ -101,7 +119,10 @@ class Feature:
 
 
 def feature_table(
-    residual_scale: Float[np.ndarray, "26"], lookahead: Sequence[int], object_kinds: Sequence[str]
+    residual_scale: Float[np.ndarray, "u"],
+    lookahead: Sequence[int],
+    object_kinds: Sequence[str],
+    hand: HandNames = HUMAN,
 ) -> tuple[Feature, ...]:
     """The features in the observation's order.
 
@@ -109,13 +130,22 @@ def feature_table(
         residual_scale: what a residual of 1 is worth (m, rad).
         lookahead: frames ahead that are seen.
         object_kinds: names of the kinds of objects.
+        hand: names of its joints and fingers.
     """
-    relative_to = "relative to the demonstrated"
+    relative_to, targets = "relative to the demonstrated", hand.targets
     return (
-        *_of_targets("error", f"coordinate {relative_to} one", lambda s: s.hand - s.target, (50.0, 5.0, 5.0)),
-        *_of_targets("speed", "speed", lambda s: s.hand_speed, (5.0, 0.5, 0.2), per="/s"),
-        *_of_targets("residual", "filtered residual so far", lambda s: s.residual, 1 / residual_scale),
-        Feature("grip", "share of the controls that presses", "rad", "joint", HINGES, lambda s: s.grip[6:], 5.0),
+        *_of_targets(targets, "error", f"coordinate {relative_to} one", lambda s: s.hand - s.target, (50.0, 5.0, 5.0)),
+        *_of_targets(targets, "speed", "speed", lambda s: s.hand_speed, (5.0, 0.5, 0.2), per="/s"),
+        *_of_targets(targets, "residual", "filtered residual so far", lambda s: s.residual, 1 / residual_scale),
+        Feature(
+            "grip",
+            "share of the controls that presses",
+            "rad",
+            "joint",
+            hand.joints,
+            lambda s: s.grip[_NUM_WRIST:],
+            5.0,
+        ),
         Feature(
             "object_position_error",
             f"object's place {relative_to} one",
@@ -153,11 +183,11 @@ def feature_table(
             "finger tips seen from the object",
             "m",
             "object",
-            tuple(f"{finger}_{axis}" for finger in FINGERS for axis in _XYZ),
+            tuple(f"{finger}_{axis}" for finger in hand.fingers for axis in _XYZ),
             lambda s: (s.tips - s.object_pose[:3]) @ s.object_axes,
             _PER_LENGTH,
         ),
-        *(feature for k, ahead in enumerate(lookahead) for feature in _of_frame_ahead(k, ahead)),
+        *(feature for k, ahead in enumerate(lookahead) for feature in _of_frame_ahead(targets, k, ahead)),
         *(_of_object_ahead(k, ahead) for k, ahead in enumerate(lookahead)),
         Feature("phase", "share of the demonstration that is over", "1", "-", ("share",), lambda s: s.phase, 2.0, 0.5),
         Feature(
@@ -194,24 +224,26 @@ def offsets_and_scales(table: Sequence[Feature]) -> tuple[Float[np.ndarray, "o"]
 
 
 def _of_targets(
+    targets: tuple[str, ...],
     name: str,
     meaning: str,
     value: Callable[[Seen], Any],
-    scales: Sequence[float] | Float[np.ndarray, "26"],
+    scales: Sequence[float] | Float[np.ndarray, "u"],
     per: str = "",
 ) -> tuple[Feature, Feature, Feature]:
-    """Rows for 26 coordinates of the hand: slides along the base's axes, turns from it, hinges.
+    """Rows for the hand's coordinates: slides along the base's axes, turns from it, joints.
 
     Args:
+        targets: names of the coordinates.
         name, meaning: of the rows.
-        value: all 26.
-        scales: of the three rows, or of all 26.
+        value: all of them.
+        scales: of the three rows, or of all.
         per: end of the unit.
     """
     parts = (
         ("wrist_position", f"m{per}", "base", slice(0, 3)),
         ("wrist_rotation", f"rad{per}", "joint", slice(3, 6)),
-        ("hinges", f"rad{per}", "joint", slice(6, 26)),
+        ("hinges", f"rad{per}", "joint", slice(_NUM_WRIST, None)),
     )
     return tuple(  # type: ignore[return-value]
         Feature(
@@ -219,16 +251,17 @@ def _of_targets(
             f"{part.replace('_', ' ')}: {meaning}",
             unit,
             frame,
-            TARGETS[place],
+            targets[place],
             lambda s, place=place: value(s)[place],
-            scales[place] if len(scales) == len(TARGETS) else scales[k],
+            scales[k] if len(scales) == len(parts) else scales[place],
         )
         for k, (part, unit, frame, place) in enumerate(parts)
     )
 
 
-def _of_frame_ahead(k: int, ahead: int) -> tuple[Feature, ...]:
+def _of_frame_ahead(targets: tuple[str, ...], k: int, ahead: int) -> tuple[Feature, ...]:
     return _of_targets(
+        targets,
         f"ahead_{ahead}",
         f"demonstrated coordinate {ahead} frames ahead, relative to the one now",
         lambda s: s.targets_ahead[k] - s.target,

@@ -8,12 +8,11 @@ import numpy as np
 from jaxtyping import Float
 
 from mjx_hand.errors import InputError
-from mjx_hand.hand.joints import FINGERS
 from mjx_hand.player.exported_policy import ExportedPolicy, load_exported_policy
-from mjx_hand.player.features import TARGETS, Feature, Seen, feature_table
+from mjx_hand.player.features import WRIST, Feature, HandNames, Seen, feature_table
 from mjx_hand.player.tracking_reference import TrackingReference, load_tracking_reference
 
-_HAND = len(TARGETS)
+_FREE = 7  # coordinates of the object, the last of a scene's; of its speed one less
 _ROTATION, _TRANSLATION = np.deg2rad(30.0), 0.03  # ManipTrans' thresholds for the object
 
 
@@ -22,13 +21,13 @@ class Played:
     """A rollout from a demonstration's first frame to its last, t frames; metres, radians, wxyz, world frame.
 
     Attributes:
-        qpos: the scene's coordinates (wrist 6, hinges 20, object's free joint 7).
+        qpos: the scene's coordinates (the wrist's six, the hand's joints, the object's free joint).
         object_reference: demonstrated pose of the object.
         position_error, rotation_error: the object's distance and angle from it.
         rate: frames a second.
     """
 
-    qpos: Float[np.ndarray, "t 33"]
+    qpos: Float[np.ndarray, "t q"]
     object_reference: Float[np.ndarray, "t 7"]
     position_error: Float[np.ndarray, "t"]
     rotation_error: Float[np.ndarray, "t"]
@@ -37,7 +36,7 @@ class Played:
     @property
     def object_pose(self) -> Float[np.ndarray, "t 7"]:
         """Where the object was."""
-        return self.qpos[:, _HAND:]
+        return self.qpos[:, -_FREE:]
 
     @property
     def success(self) -> bool:
@@ -62,11 +61,11 @@ def play_policy(policy: str | Path | ExportedPolicy, reference: str | Path) -> P
         player.step()
         path.append(player.data.qpos.copy())
     qpos, wanted = np.stack(path), player.reference.object_pose.astype(float)
-    turns = np.array([_turn(a, b) for a, b in zip(qpos[:, _HAND + 3 :], wanted[:, 3:], strict=True)])
+    turns = np.array([_turn(a, b) for a, b in zip(qpos[:, -4:], wanted[:, 3:], strict=True)])
     return Played(
         qpos=qpos,
         object_reference=wanted,
-        position_error=np.linalg.norm(qpos[:, _HAND : _HAND + 3] - wanted[:, :3], axis=1),
+        position_error=np.linalg.norm(qpos[:, -_FREE:-4] - wanted[:, :3], axis=1),
         rotation_error=np.linalg.norm(turns, axis=1),
         rate=player.reference.rate,
     )
@@ -83,13 +82,16 @@ class Player:
 
     def __init__(self, policy: ExportedPolicy, reference: TrackingReference, folder: Path):
         self.policy, self.reference = policy, reference
-        self.model = _scene(folder / reference.scene)
+        names = _hand(policy)
+        self.model = _scene(folder / reference.scene, names)
         self.data = mujoco.MjData(self.model)
-        self._features = _features(policy, reference)
-        self._tips = [self.model.site(f"{finger}_tip").id for finger in FINGERS]
+        self._features = _features(policy, reference, names)
+        self._tips = [self.model.site(f"{finger}_tip").id for finger in names.fingers]
         self._wrist, self._object = self.model.body("wrist").id, self.model.body("object").id
+        joints = [self.model.joint(name) for name in names.targets]
+        self._qpos, self._qvel = ([int(j.qposadr[0]) for j in joints], [int(j.dofadr[0]) for j in joints])
         self._lookahead = np.array(policy.contract["lookahead"])
-        self.frame, self.residual = 0, np.zeros(_HAND, np.float32)
+        self.frame, self.residual = 0, np.zeros(len(joints), np.float32)
         self.data.qpos[:], self.data.qvel[:] = reference.start_qpos, reference.start_qvel
 
     def step(self) -> None:
@@ -110,13 +112,13 @@ class Player:
         reference, data, frame = self.reference, self.data, self.frame
         mujoco.mj_kinematics(self.model, data)  # places follow the state; mj_step leaves them a step behind
         later = np.minimum(frame + self._lookahead, reference.num_frames - 1)
-        pose = data.qpos[_HAND:]
+        pose = data.qpos[-_FREE:]
         return Seen(
-            hand=data.qpos[:_HAND],
-            hand_speed=data.qvel[:_HAND],
+            hand=data.qpos[self._qpos],
+            hand_speed=data.qvel[self._qvel],
             residual=self.residual,
             object_pose=pose,
-            object_speed=data.qvel[_HAND:],
+            object_speed=data.qvel[1 - _FREE :],
             object_turn=_turn(pose[3:], reference.object_pose[frame, 3:]),
             object_axes=data.xmat[self._object].reshape(3, 3),
             wrist_place=data.xpos[self._wrist],
@@ -141,12 +143,12 @@ def _turn(a: Float[np.ndarray, "4"], b: Float[np.ndarray, "4"]) -> Float[np.ndar
     return turn
 
 
-def _features(policy: ExportedPolicy, reference: TrackingReference) -> list[Feature]:
+def _features(policy: ExportedPolicy, reference: TrackingReference, hand: HandNames) -> list[Feature]:
     """The features that the policy reads, in its order."""
     known = {
         feature.name: feature
         for feature in feature_table(
-            policy.residual_scale, policy.contract["lookahead"], policy.contract["object_kinds"]
+            policy.residual_scale, policy.contract["lookahead"], policy.contract["object_kinds"], hand
         )
     }
     inputs = policy.contract["inputs"]
@@ -168,8 +170,22 @@ def _features(policy: ExportedPolicy, reference: TrackingReference) -> list[Feat
     return [known[entry["name"]] for entry in inputs]
 
 
-def _scene(path: Path) -> mujoco.MjModel:
-    """The scene, whose coordinates are the hand's 26 and the object's free joint."""
+def _hand(policy: ExportedPolicy) -> HandNames:
+    """What the contract calls the hand's joints and fingers.
+
+    Raises:
+        InputError: it does not tell.
+    """
+    elements = {entry["name"]: entry["elements"] for entry in policy.contract["inputs"]}
+    try:
+        joints, places = elements["grip"], elements["tips_in_object"]
+    except KeyError as missing:
+        raise InputError(f"the policy's contract has no input {missing}; export the policy again") from None
+    return HandNames(tuple(joints), tuple(dict.fromkeys(place.rpartition("_")[0] for place in places)))
+
+
+def _scene(path: Path, hand: HandNames) -> mujoco.MjModel:
+    """The scene, whose coordinates are the wrist's six, the hand's joints and the object's free joint."""
     if not path.is_file():
         raise InputError(f"{path}: no such scene; it belongs beside the reference, so export both together")
     try:
@@ -177,6 +193,7 @@ def _scene(path: Path) -> mujoco.MjModel:
     except ValueError as error:
         raise InputError(f"{path}: MuJoCo cannot load it ({str(error).splitlines()[0]}); export it again") from None
     names = [model.joint(k).name for k in range(model.njnt)]
-    if names != [*TARGETS, "object"] or model.nu != _HAND:
+    moved = [model.actuator(k).name for k in range(model.nu)]
+    if names[: len(WRIST)] != [*WRIST] or names[-1:] != ["object"] or moved != [*hand.targets]:
         raise InputError(f"{path}: not a scene of the hand with an object; export it again")
     return model

@@ -11,7 +11,7 @@ from mjx_hand.files.checked_arrays import Dimension, numbers, text
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 
 SCHEMA = "mjx-hand/tracking-reference/1"
-_COORDINATES = "wrist slides along the base's axes (m), wrist turns and hinges (rad)"
+_COORDINATES = "wrist slides along the base's axes (m), wrist turns and joints (rad)"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,18 +25,18 @@ class Field:
 
 
 FIELDS = {
-    "targets": Field(("t", 26), "m, rad", "base, joint", f"demonstrated: {_COORDINATES}"),
-    "controls": Field(("t", 26), "m, rad", "base, joint", "what to command for the step that ends at a frame"),
-    "grip": Field(("t", 26), "m, rad", "base, joint", "the share of the controls that presses the fingers"),
+    "targets": Field(("t", "u"), "m, rad", "base, joint", f"demonstrated: {_COORDINATES}"),
+    "controls": Field(("t", "u"), "m, rad", "base, joint", "what to command for the step that ends at a frame"),
+    "grip": Field(("t", "u"), "m, rad", "base, joint", "the share of the controls that presses the fingers"),
     "object_pose": Field(("t", 7), "m, 1", "world", "demonstrated place and quaternion (wxyz) of the object"),
     "base": Field(
         (3, 3), "1", "world", "world_from_base of the wrist, whose orientation is base Rx Ry Rz of its turns"
     ),
     "object_features": Field(("f",), "m, kg, 1", "object", "size (3), mass, sliding friction, 1 for the kind"),
-    "start_qpos": Field((33,), "m, rad, 1", "base, joint, world", "the scene's qpos at frame 0"),
-    "start_qvel": Field((32,), "m/s, rad/s", "base, joint, world", "the scene's qvel at frame 0"),
-    "low": Field((26,), "m, rad", "base, joint", "least that an actuator may be told"),
-    "high": Field((26,), "m, rad", "base, joint", "most that an actuator may be told"),
+    "start_qpos": Field(("q",), "m, rad, 1", "base, joint, world", "the scene's qpos at frame 0"),
+    "start_qvel": Field(("v",), "m/s, rad/s", "base, joint, world", "the scene's qvel at frame 0"),
+    "low": Field(("u",), "m, rad", "base, joint", "least that an actuator may be told"),
+    "high": Field(("u",), "m, rad", "base, joint", "most that an actuator may be told"),
     "rate": Field((), "1/s", "-", "frames, and so control steps, a second"),
     "substeps": Field((), "1", "-", "physics steps a control step"),
 }
@@ -46,16 +46,16 @@ FIELDS = {
 class TrackingReference:
     """A demonstration of t frames, as `FIELDS` tells; `scene` is the name of the MJCF file beside it."""
 
-    targets: Float[np.ndarray, "t 26"]
-    controls: Float[np.ndarray, "t 26"]
-    grip: Float[np.ndarray, "t 26"]
+    targets: Float[np.ndarray, "t u"]
+    controls: Float[np.ndarray, "t u"]
+    grip: Float[np.ndarray, "t u"]
     object_pose: Float[np.ndarray, "t 7"]
     base: Float[np.ndarray, "3 3"]
     object_features: Float[np.ndarray, "f"]
-    start_qpos: Float[np.ndarray, "33"]
-    start_qvel: Float[np.ndarray, "32"]
-    low: Float[np.ndarray, "26"]
-    high: Float[np.ndarray, "26"]
+    start_qpos: Float[np.ndarray, "q"]
+    start_qvel: Float[np.ndarray, "v"]
+    low: Float[np.ndarray, "u"]
+    high: Float[np.ndarray, "u"]
     rate: float
     substeps: int
     scene: str

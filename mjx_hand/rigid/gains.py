@@ -1,12 +1,13 @@
 """Gains of the hand's position-controlled joints: human-like stiffness and force limits."""
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
 
 from mjx_hand.errors import InputError
-from mjx_hand.hand.joints import FINGERS, HINGES
+from mjx_hand.hand.joints import FINGERS
 
 # N m/rad and N m for (abduction, base flexion, middle hinge, last hinge).
 # Simulated grasps of five types hold with them.
@@ -20,12 +21,12 @@ def _by_finger(finger: tuple[float, ...], thumb: tuple[float, ...]) -> Float[np.
 
 @dataclasses.dataclass(frozen=True)
 class Gains:
-    """Position control of the 20 hinges, in the order of `HINGES`, and of the wrist's six joints.
+    """Position control of a hand's actuated joints and of the wrist's six; the default is that of the human hand.
 
     Attributes:
-        stiffness: kp (N m/rad).
+        stiffness: kp (N m/rad) of each joint; of the human hand in the order of `HINGES`.
         force_limit: largest torque (N m).
-        damping_ratio: kv = damping_ratio * sqrt(kp) (N m s/rad).
+        damping_ratio: kv = damping_ratio * sqrt(kp) (N m s/rad), one number or one a joint.
         armature: reflected inertia (kg m^2); it also keeps light fingers stable at 4 ms steps.
         max_velocity: joint speed (rad/s) that the URDF states.
         wrist_slide: kp (N/m), kv (N s/m) of the wrist's three slides.
@@ -34,13 +35,13 @@ class Gains:
             buzzes at 4 ms steps.
     """
 
-    stiffness: Float[np.ndarray, "20"] = dataclasses.field(
+    stiffness: Float[np.ndarray, "j"] = dataclasses.field(
         default_factory=lambda: _by_finger(_FINGER_STIFFNESS, _THUMB_STIFFNESS)
     )
-    force_limit: Float[np.ndarray, "20"] = dataclasses.field(
+    force_limit: Float[np.ndarray, "j"] = dataclasses.field(
         default_factory=lambda: _by_finger(_FINGER_LIMIT, _THUMB_LIMIT)
     )
-    damping_ratio: float = 0.02
+    damping_ratio: float | Float[np.ndarray, "j"] = 0.02
     armature: float = 2e-4
     max_velocity: float = 20.0
     wrist_slide: tuple[float, float] = (8000.0, 180.0)
@@ -48,11 +49,17 @@ class Gains:
     wrist_armature: float = 0.005
 
     def __post_init__(self):
-        for name in ("stiffness", "force_limit"):
-            found = np.shape(getattr(self, name))
-            if found != (len(HINGES),):
-                raise InputError(f"gains: {name} has shape {found}, expected ({len(HINGES)},), one value a hinge")
+        stiffness, limit = np.shape(self.stiffness), np.shape(self.force_limit)
+        if len(stiffness) != 1 or stiffness != limit:
+            raise InputError(
+                f"gains: stiffness has shape {stiffness}, force_limit {limit}; give each one value a joint"
+            )
+
+    def check_for(self, joints: Sequence[str]) -> None:
+        """Raise InputError unless there is one value for each of these joints."""
+        if len(self.stiffness) != len(joints):
+            raise InputError(f"gains are of {len(self.stiffness)} joints, the hand has {len(joints)} that are actuated")
 
     @property
-    def damping(self) -> Float[np.ndarray, "20"]:
+    def damping(self) -> Float[np.ndarray, "j"]:
         return self.damping_ratio * np.sqrt(self.stiffness)

@@ -45,6 +45,16 @@ def check_goes_with(robot: RobotHand, urdf: str | Path, side: str) -> None:
         InputError: the description's directions are not the links', or the robot is a hand of the other side.
     """
     found = hand_axes(robot, urdf)
+    check_directions(robot, urdf, found)
+    if found.side not in (None, side):
+        raise InputError(
+            f"the recording is of a {side} hand, and {urdf} with {robot.name} is a {found.side} hand; give a {side} "
+            f"hand's URDF and description, or record a {found.side} hand"
+        )
+
+
+def check_directions(robot: RobotHand, urdf: str | Path, found: HandAxes) -> None:
+    """Raise InputError where the description's directions are not what the links tell."""
     for name, said, seen in (("fingers", robot.fingers, found.fingers), ("palmar", robot.palmar, found.palmar)):
         if seen is None:
             continue
@@ -54,11 +64,6 @@ def check_goes_with(robot: RobotHand, urdf: str | Path, side: str) -> None:
                 f"{robot.name}: {name} is {_listed(said)}, {angle:.0f} degrees from what the links of {urdf} do, "
                 f"{_listed(seen)}; correct it, or give the URDF that belongs to the description"
             )
-    if found.side not in (None, side):
-        raise InputError(
-            f"the recording is of a {side} hand, and {urdf} with {robot.name} is a {found.side} hand; give a {side} "
-            f"hand's URDF and description, or record a {found.side} hand"
-        )
 
 
 def hand_axes(robot: RobotHand, urdf: str | Path) -> HandAxes:

@@ -4,7 +4,8 @@ Descriptions that come with the project are `mjx_hand/robots/descriptions/NAME.y
 file serves as well. The URDF is the user's own.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,8 @@ from mjx_hand.robots.solver.objectives import KINDS, Objective, dexpilot_pairs
 ROBOTS = Path(__file__).parent / "descriptions"
 SMALLEST, LARGEST = 0.05, 20.0  # of a robot over a person: from a toy to an excavator
 _NEEDED = ("palm", "tips", "scaling", "fingers", "palmar")
-_KNOWN = (*_NEEDED, "joints", "vectors")
+_KNOWN = (*_NEEDED, "joints", "vectors", "urdf", "force_limits", "stiffness")
+_MOST = 1e4  # N m, N m/rad
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,9 @@ class RobotHand:
         joints: further links and their keypoints.
         all_vectors: whether the objective `vector` follows `joints` too, not only `tips`.
         scaling: the robot's size over a person's.
+        urdf: its file, where the description says one.
+        force_limits, stiffness: of single joints (N m, N m/rad; of sliding ones N, N/m), in the place of what
+            `robots.model.gains` would have.
         fingers, palmar: directions in the frame of the URDF's root link, unit and at right angles: where straight
             fingers point, and out of the palm.
     """
@@ -46,6 +51,9 @@ class RobotHand:
     scaling: float
     fingers: np.ndarray
     palmar: np.ndarray
+    urdf: Path | None = None
+    force_limits: dict[str, float] = field(default_factory=dict)
+    stiffness: dict[str, float] = field(default_factory=dict)
 
 
 def known_robots() -> tuple[str, ...]:
@@ -100,7 +108,55 @@ def _checked(path: Path, content: Any) -> RobotHand:
         scaling=float(scaling),
         fingers=fingers,
         palmar=palmar,
+        urdf=_urdf(path, content.get("urdf")),
+        force_limits=_by_joint(path, "force_limits", content.get("force_limits", {})),
+        stiffness=_by_joint(path, "stiffness", content.get("stiffness", {})),
     )
+
+
+def _urdf(path: Path, value: Any) -> Path | None:
+    """Where a description's URDF is: beside it, or with `PACKAGE:PATH` in an installed Python package."""
+    if value is None:
+        return None
+    if not isinstance(value, str) or not value:
+        raise InputError(f"{path}: urdf is {shown(value)}; give a path from this file on, or PACKAGE:PATH")
+    package, found, inside = value.partition(":")
+    if not found:
+        return path.parent / value
+    spec = find_spec(package) if package.isidentifier() else None
+    if spec is None or spec.origin is None:
+        return Path(value)  # which is said to be absent when it is read
+    return Path(spec.origin).parent / inside
+
+
+def _by_joint(path: Path, name: str, value: Any) -> dict[str, float]:
+    if not isinstance(value, dict):
+        raise InputError(f"{path}: {name} is {shown(value)}; give joints their numbers")
+    for joint, number in value.items():
+        if isinstance(number, bool) or not isinstance(number, int | float) or not 0 < number <= _MOST:
+            raise InputError(
+                f"{path}: {name} of {shown(joint)} is {shown(number)}; give a positive number, up to {_MOST:g}"
+            )
+    return {str(joint): float(number) for joint, number in value.items()}
+
+
+def urdf_of(robot: RobotHand, given: str | Path | None = None) -> Path:
+    """The robot's URDF: the one given, or the description's own.
+
+    Raises:
+        InputError: neither is there.
+    """
+    if given is not None:
+        return Path(given)
+    if robot.urdf is None:
+        raise InputError(f"{robot.name}: its description names no URDF; add urdf: FILE to it, or give the file")
+    package, colon, _ = str(robot.urdf).partition(":")
+    if colon and not robot.urdf.is_file():
+        raise InputError(
+            f"{robot.name}: its URDF comes with the Python package {package}, which is not installed: pip install "
+            f"{package.replace('_', '-')}, or give a URDF of your own"
+        )
+    return robot.urdf
 
 
 def _direction(path: Path, name: str, value: Any) -> np.ndarray:

@@ -73,7 +73,7 @@ class Script:
 
     variant: Int[np.ndarray, "n"]
     frame: Int[np.ndarray, "n"]
-    controls: Float[np.ndarray, "t n 26"]
+    controls: Float[np.ndarray, "t n u"]
 
 
 def make_script(env: TrackingEnv, worlds: int) -> Script:
@@ -87,7 +87,9 @@ def make_script(env: TrackingEnv, worlds: int) -> Script:
     for k in range(1, PASS + 1):
         action = rng.uniform(-1, 1, residual.shape)
         smoothing = env.task.smoothing
-        residual = smoothing * residual + (1 - smoothing) * np.asarray(residual_scale(env.task)) * action
+        residual = (
+            smoothing * residual + (1 - smoothing) * np.asarray(residual_scale(env.task, env.body.names)) * action
+        )
         target = np.asarray(env.reference.controls)[variant, frame + k] + residual
         controls.append(np.clip(target, *env.engine.models[0].actuator_ctrlrange.T))
     return Script(variant, frame, np.array(controls))

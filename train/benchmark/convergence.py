@@ -39,7 +39,7 @@ _ENDS = {
     "1000 sweeps": Settings({"iterations": 1000, "tolerance": 0.0}),
     "Newton's": newton(200, tolerance=1e-12, ls_iterations=200),
 }
-_Step = Callable[[PhysicsState, Float[jax.Array, "n 26"]], PhysicsState]
+_Step = Callable[[PhysicsState, Float[jax.Array, "n u"]], PhysicsState]
 _SHARES = (50, 90, 99)  # percent of the control steps that end as near as a column says
 
 
@@ -118,7 +118,7 @@ def report(options: Options) -> list[str]:
     return [*lines, "", *(str(file) for file in files)]
 
 
-def moments(env: TrackingEnv, worlds: int) -> tuple[PhysicsState, Float[jax.Array, "n 26"]]:
+def moments(env: TrackingEnv, worlds: int) -> tuple[PhysicsState, Float[jax.Array, "n u"]]:
     """States that worlds pass through under jumping targets, and the targets of the control step that follows each."""
     script = make_script(env, worlds)
     state = jax.jit(jax.vmap(env.start))(script.variant, script.frame).pipeline_state.physics
@@ -137,7 +137,7 @@ def _stepper(env: TrackingEnv, settings: Settings) -> _Step:
     return jax.jit(jax.vmap(engine.step))
 
 
-def _ends(step: _Step, state: PhysicsState, controls: Float[jax.Array, "n 26"]) -> Float[np.ndarray, "n q"]:
+def _ends(step: _Step, state: PhysicsState, controls: Float[jax.Array, "n u"]) -> Float[np.ndarray, "n q"]:
     """Where one control step leads."""
     return np.asarray(step(state, controls).qpos)
 

@@ -70,7 +70,7 @@ def evaluate_seeds(configs: Sequence[Config], part: str = "heldout") -> dict[int
                 "alone"
             )
     env = load_env(configs[0], part)
-    checkpoints = {config.seed: chosen_checkpoint(config, env.observation_size) for config in configs}
+    checkpoints = {config.seed: chosen_checkpoint(config, env.observation_size, env.action_size) for config in configs}
     objects = [demonstration.object for demonstration in env.demonstrations]
     policy = deterministic_policy(configs[0].ppo, env.observation_size, env.action_size)
     rollouts: dict[int | str, Rollouts] = {}
@@ -86,7 +86,7 @@ def evaluate_seeds(configs: Sequence[Config], part: str = "heldout") -> dict[int
         for title in BASELINES:
             rollouts[title] = roll_out(None, given[title])
             advance(1)
-    scores = {key: evaluate(each, objects) for key, each in rollouts.items()}
+    scores = {key: evaluate(each, objects, env.body.palm) for key, each in rollouts.items()}
     overlaps = {key: hand_overlap(each, env.models) for key, each in rollouts.items()}
     keys = {seed: {POLICY: seed, **{title: title for title in BASELINES}} for seed in checkpoints}
     return {

@@ -12,11 +12,10 @@ from envs.disturbances.randomize import Randomize
 from envs.evaluation.evaluate import Evaluation, evaluate
 from envs.evaluation.roll_out import make_roll_out
 from envs.evaluation.rollout import Rollouts
-from envs.scene import NUM_WRIST
 from envs.tracking import TrackingEnv
 from envs.twin import Tables
 from mjx_hand.errors import InputError
-from mjx_hand.hand.joints import NUM_HINGES
+from mjx_hand.player.features import HUMAN
 from train.learning.checkpoint import Checkpoint, load_checkpoint
 from train.learning.policy import check_policy, deterministic_policy
 from train.learning.run_folder import BEST
@@ -81,7 +80,7 @@ def settled(config: Config, given: Collection[str]) -> Config:
     return config
 
 
-def chosen_checkpoint(config: Config, observation_size: int) -> Checkpoint:
+def chosen_checkpoint(config: Config, observation_size: int, action_size: int = len(HUMAN.targets)) -> Checkpoint:
     """The checkpoint of `chosen_path`, if it is of this experiment's task, demonstrations and network.
 
     Raises:
@@ -101,7 +100,7 @@ def chosen_checkpoint(config: Config, observation_size: int) -> Checkpoint:
             f"{path}: reads {checkpoint.observation_size} observations, this task gives {observation_size}; "
             "use the task options it was trained with, or train again"
         )
-    check_policy(path, checkpoint.policy, config.ppo, observation_size, NUM_WRIST + NUM_HINGES)
+    check_policy(path, checkpoint.policy, config.ppo, observation_size, action_size)
     return checkpoint
 
 
@@ -111,7 +110,7 @@ def rolled_out(config: Config, env: TrackingEnv) -> tuple[Checkpoint, Rollouts, 
     Raises:
         InputError: as `chosen_checkpoint`.
     """
-    checkpoint = chosen_checkpoint(config, env.observation_size)
+    checkpoint = chosen_checkpoint(config, env.observation_size, env.action_size)
     policy = deterministic_policy(config.ppo, env.observation_size, env.action_size)
     rollouts = make_roll_out(env, policy)(checkpoint.policy)
-    return checkpoint, rollouts, evaluate(rollouts, [demonstration.object for demonstration in env.demonstrations])
+    return checkpoint, rollouts, evaluate(rollouts, [d.object for d in env.demonstrations], env.body.palm)

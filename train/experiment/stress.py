@@ -77,8 +77,10 @@ def stress(configs: Sequence[Config], part: str = "heldout") -> Stress:
     """
     first = configs[0]
     recorded = load_env(first, part, ROWS[RECORDED])
-    checkpoints = {config.seed: chosen_checkpoint(config, recorded.observation_size) for config in configs}
-    objects = [demonstration.object for demonstration in recorded.demonstrations]
+    checkpoints = {
+        config.seed: chosen_checkpoint(config, recorded.observation_size, recorded.action_size) for config in configs
+    }
+    objects, palm = [demonstration.object for demonstration in recorded.demonstrations], recorded.body.palm
     policy = deterministic_policy(first.ppo, recorded.observation_size, recorded.action_size)
     policies: dict[str, dict[int, Evaluation]] = {}
     presses: dict[str, Evaluation] = {}
@@ -93,10 +95,12 @@ def stress(configs: Sequence[Config], part: str = "heldout") -> Stress:
         for row, randomize in ROWS.items():
             tables = (recorded if row == RECORDED else load_env(first, part, randomize)).tables
             policies[row] = {
-                seed: evaluate(learned(checkpoint.policy, tables), objects) for seed, checkpoint in checkpoints.items()
+                seed: evaluate(learned(checkpoint.policy, tables), objects, palm)
+                for seed, checkpoint in checkpoints.items()
             }
             scored = [
-                evaluate(zero(None, dataclasses.replace(tables, reference=reference)), objects) for reference in pressed
+                evaluate(zero(None, dataclasses.replace(tables, reference=reference)), objects, palm)
+                for reference in pressed
             ]
             presses[row] = max(scored, key=lambda evaluation: evaluation.scores["kept"].mean())
             advance(1)

@@ -10,7 +10,7 @@ import numpy as np
 from envs.observation import observed_features
 from envs.scene import TIMESTEP
 from envs.task import Task
-from mjx_hand.hand.joints import HINGES, WRIST_SLIDES, WRIST_TURNS
+from mjx_hand.hand.joints import WRIST_SLIDES
 from mjx_hand.objects.description import OBJECT_KINDS
 from mjx_hand.player.exported_policy import ExportedPolicy
 from mjx_hand.player.features import OBSERVATION_LIMIT, TARGETS, Feature
@@ -21,7 +21,7 @@ from train.learning.checkpoint import Checkpoint
 
 SCHEMA = "mjx-hand/contract/1"
 _PACKAGES = ("mjx-hand", "jax", "brax", "flax", "mujoco", "numpy")
-_UNITS = ["m"] * len(WRIST_SLIDES) + ["rad"] * (len(WRIST_TURNS) + len(HINGES))
+_UNITS = ["m"] * len(WRIST_SLIDES) + ["rad"] * (len(TARGETS) - len(WRIST_SLIDES))
 
 
 def make_contract(

@@ -7,6 +7,7 @@ import numpy as np
 
 from envs.physics.solver import gauss_seidel
 from envs.scene import base_rotation, scene_spec
+from mjx_hand.bodies.body import Body
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.rigid.rigid_hand import RigidHand
 
@@ -33,7 +34,7 @@ _TYPES = {
 }
 
 
-def scene_xml(demonstration: Demonstration, hand: RigidHand) -> str:
+def scene_xml(demonstration: Demonstration, hand: RigidHand | Body) -> str:
     """The scene, with the native engine's solver, in one file."""
     spec = scene_spec(
         hand, demonstration.object, demonstration.support, demonstration.support_position, base_rotation(demonstration)

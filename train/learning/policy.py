@@ -70,12 +70,12 @@ def check_policy(path: str | Path, parameters: Any, ppo: Ppo, observation_size: 
 
 def deterministic_policy(
     ppo: Ppo, observation_size: int, action_size: int
-) -> Callable[[Any, Float[Array, "n o"]], Float[Array, "n 26"]]:
+) -> Callable[[Any, Float[Array, "n o"]], Float[Array, "n u"]]:
     """The policy's mean action as a function of (policy parameters, observations)."""
     made = network_factory(ppo)(observation_size, action_size)
     infer = networks.make_inference_fn(made)
 
-    def act(parameters: Any, observation: Float[Array, "n o"]) -> Float[Array, "n 26"]:
+    def act(parameters: Any, observation: Float[Array, "n o"]) -> Float[Array, "n u"]:
         # Observations are scaled by hand, so Brax's normaliser has nothing to say.
         return infer((None, parameters, None), deterministic=True)(observation, jax.random.key(0))[0]
 

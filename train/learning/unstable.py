@@ -40,7 +40,7 @@ class Unstable:
     frame: int
     qpos: Float[np.ndarray, "q"]
     qvel: Float[np.ndarray, "v"]
-    targets: Float[np.ndarray, "26"]
+    targets: Float[np.ndarray, "u"]
 
 
 class UnstableLog:
@@ -90,7 +90,7 @@ def load_unstable(path: str | Path) -> Unstable:
     """
     arrays = load_arrays(path, SCHEMA)
     whole = ("seed", "steps", "world", "demonstration", "frame")
-    layout = {**dict.fromkeys(whole, ()), "qpos": ("q",), "qvel": ("v",), "targets": (26,)}
+    layout = {**dict.fromkeys(whole, ()), "qpos": ("q",), "qvel": ("v",), "targets": ("u",)}
     found = numbers(path, arrays, layout, finite=False)
     return Unstable(
         **{name: int(found[name]) for name in whole},

@@ -7,7 +7,6 @@ from scipy.spatial.transform import Rotation
 from envs.evaluation.metrics import position_error, rotation_error
 from envs.evaluation.rollout import Rollouts
 from envs.scene import NUM_WRIST, base_rotation
-from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion import Demonstration, JointMotion
 from mjx_hand.motion.resample import quaternion_matrices
@@ -67,7 +66,7 @@ def posed(demonstration: Demonstration, qpos: Float[np.ndarray, "t q"], fps: flo
     turned = Rotation.from_matrix(base) * Rotation.from_euler("XYZ", qpos[:, 3:NUM_WRIST])
     return JointMotion(
         fps=fps,
-        angles=qpos[:, NUM_WRIST : NUM_WRIST + NUM_HINGES],
+        angles=qpos[:, NUM_WRIST : NUM_WRIST + demonstration.motion.angles.shape[1]],
         wrist_position=qpos[:, :3] @ base.T,
         wrist_quaternion=turned.as_quat(scalar_first=True),
         valid=np.ones(len(qpos), bool),

@@ -4,15 +4,13 @@ import numpy as np
 
 from envs.scene import NUM_WRIST
 from envs.tracking import TrackingEnv
+from mjx_hand.bodies.human_body import person
 from mjx_hand.errors import InputError
-from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.pytree import replace
 from mjx_hand.view.browser.hand_scene import object_layers, twin_layer
 from mjx_hand.view.browser.scene import Curve, Scene
 from train.learning.unstable import Unstable, step_again
 from train.view.play_scene import ghost, posed
-
-_NUM_TARGETS = NUM_WRIST + NUM_HINGES
 
 
 def unstable_scene(unstable: Unstable, env: TrackingEnv, name: str) -> Scene:
@@ -34,22 +32,23 @@ def unstable_scene(unstable: Unstable, env: TrackingEnv, name: str) -> Scene:
             f"play.unstable follows demonstration {k} in {len(unstable.qpos)} coordinates; {name!r} has "
             f"{len(env.demonstrations)} of {engine.models[0].nq}: give the config and data it was trained with"
         )
-    demonstration, hand = env.demonstrations[k], env.hands[k]
+    demonstration, hand = env.demonstrations[k], person(env.hands[k])
+    first = env.body.num_coordinates  # of the object's coordinates
     fps = float(1 / engine.models[k].opt.timestep)
     path = step_again(engine.models[k], unstable, engine.substeps)
     motion = posed(demonstration, path, fps)
-    told = np.where(np.isfinite(unstable.targets), unstable.targets, unstable.qpos[:_NUM_TARGETS])
+    told = np.where(np.isfinite(unstable.targets), unstable.targets, env.body.of_targets(unstable.qpos))
     commanded = posed(demonstration, np.repeat(told[None], len(path), axis=0), fps)
-    shown = replace(demonstration, motion=motion, object_pose=path[:, _NUM_TARGETS:])
+    shown = replace(demonstration, motion=motion, object_pose=path[:, first:])
     layers = (
         twin_layer(motion, hand, "twin"),
         *object_layers(shown),
         ghost(twin_layer(commanded, hand, "commanded")),
     )
     away = path - path[0]
-    turned = np.rad2deg(np.abs(away[:, NUM_WRIST:_NUM_TARGETS]).max(axis=1))
+    turned = np.rad2deg(np.abs(away[:, NUM_WRIST:first]).max(axis=1))
     curves = (
-        Curve("object, moved", 100 * np.linalg.norm(away[:, _NUM_TARGETS : _NUM_TARGETS + 3], axis=1), "cm"),
+        Curve("object, moved", 100 * np.linalg.norm(away[:, first : first + 3], axis=1), "cm"),
         Curve("hinge that turned most", turned, "degrees"),
     )
     title = (

@@ -43,12 +43,12 @@ class Posture:
         contact_point: that point relative to the object's centre (m).
     """
 
-    angles: Float[Array, "*b 20"]
+    angles: Float[Array, "*b j"]
     rotation: Float[Array, "*b 3 3"]
     position: Float[Array, "*b 3"]
     touch_error: Float[Array, "*b"]
     contact_normal: Float[Array, "*b c 3"]
-    contact_jacobian: Float[Array, "*b c 3 20"]
+    contact_jacobian: Float[Array, "*b c 3 j"]
     contact_point: Float[Array, "*b c 3"]
 
 
@@ -63,7 +63,7 @@ def solve_postures(grasp: GraspType, hands: Sequence[RigidHand], objects: Sequen
     return jax.tree.map(lambda *leaves: jnp.concatenate(leaves)[: len(hands)], *parts)
 
 
-def squeeze_angles(closing: Pads | Wrap, posture: Posture, gains: Gains) -> Float[np.ndarray, "20"]:
+def squeeze_angles(closing: Pads | Wrap, posture: Posture, gains: Gains) -> Float[np.ndarray, "j"]:
     """Hinge offsets (rad) that make one posture press: dq = torque / kp.
 
     Pads press with balanced forces, torque = J^T f: the first contact with `closing.force` newtons, the others share
@@ -82,7 +82,7 @@ def squeeze_angles(closing: Pads | Wrap, posture: Posture, gains: Gains) -> Floa
     return np.clip(torque, -gains.force_limit, gains.force_limit) / gains.stiffness
 
 
-def opened_angles(closing: Pads | Wrap, posture: Posture) -> Float[np.ndarray, "20"]:
+def opened_angles(closing: Pads | Wrap, posture: Posture) -> Float[np.ndarray, "j"]:
     """Hinge angles (rad) before the grasp.
 
     Pads go `closing.opening` metres straight off their faces, by damped least squares: fingers that leave, and so

@@ -10,7 +10,6 @@ from mujoco import batch
 from scipy.spatial.transform import Rotation
 
 from envs.scene import NUM_WRIST
-from mjx_hand.hand.joints import NUM_HINGES
 
 # What can come of a script; the first is success.
 OUTCOMES = ("held", "diverged", "not lifted", "slipped", "turned in the hand")
@@ -30,7 +29,7 @@ class Performance:
             not lifted at the end; or it moved or turned in the hand between the lift's end and the last frame.
     """
 
-    angles: Float[np.ndarray, "n t 20"]
+    angles: Float[np.ndarray, "n t j"]
     wrist_position: Float[np.ndarray, "n t 3"]
     wrist_rotation: Float[np.ndarray, "n t 3 3"]
     object_pose: Float[np.ndarray, "n t 7"]
@@ -44,7 +43,7 @@ class Performance:
 def perform(
     models: Sequence[mujoco.MjModel],
     bases: Float[np.ndarray, "n 3 3"],
-    controls: Float[np.ndarray, "n t 26"],
+    controls: Float[np.ndarray, "n t u"],
     object_start: Float[np.ndarray, "n 7"],
     lifted_at: Float[np.ndarray, "n"],
 ) -> Performance:
@@ -62,7 +61,7 @@ def perform(
 
 
 def roll_out(
-    models: Sequence[mujoco.MjModel], controls: Float[np.ndarray, "n t 26"], object_start: Float[np.ndarray, "n 7"]
+    models: Sequence[mujoco.MjModel], controls: Float[np.ndarray, "n t u"], object_start: Float[np.ndarray, "n 7"]
 ) -> tuple[Float[np.ndarray, "n t q"], Bool[np.ndarray, "n"]]:
     """qpos after each physics step, and in which worlds the engine found a bad number; arguments as of `perform`."""
     count, steps = controls.shape[:2]
@@ -84,9 +83,9 @@ def judge(
     turns = Rotation.from_euler("XYZ", qpos[..., 3:NUM_WRIST].reshape(-1, 3)).as_matrix().reshape(count, steps, 3, 3)
     rotation = bases[:, None] @ turns
     position = np.einsum("nij,ntj->nti", bases, qpos[..., :3])
-    pose = qpos[..., NUM_WRIST + NUM_HINGES :]
+    pose = qpos[..., -7:]
     return Performance(
-        angles=qpos[..., NUM_WRIST : NUM_WRIST + NUM_HINGES],
+        angles=qpos[..., NUM_WRIST:-7],
         wrist_position=position,
         wrist_rotation=rotation,
         object_pose=pose,

@@ -54,9 +54,9 @@ class GraspMotion:
         turn: rotation vector of the last turn.
     """
 
-    open_angles: Float[np.ndarray, "20"]
-    closed_angles: Float[np.ndarray, "20"]
-    squeeze_angles: Float[np.ndarray, "20"]
+    open_angles: Float[np.ndarray, "j"]
+    closed_angles: Float[np.ndarray, "j"]
+    squeeze_angles: Float[np.ndarray, "j"]
     position: Float[np.ndarray, "3"]
     rotation: Float[np.ndarray, "3 3"]
     approach: Float[np.ndarray, "3"]
@@ -67,7 +67,7 @@ class GraspMotion:
 
 def scripted_targets(
     motion: GraspMotion, time: Float[np.ndarray, "t"]
-) -> tuple[Float[np.ndarray, "t 20"], Float[np.ndarray, "t 3"], Float[np.ndarray, "t 4"]]:
+) -> tuple[Float[np.ndarray, "t j"], Float[np.ndarray, "t 3"], Float[np.ndarray, "t 4"]]:
     """Target hinge angles (rad), wrist positions (m) and quaternions (wxyz) at the given times (s)."""
     stage = {name: motion.tempo.progress(name, time)[:, None] for name in Tempo.__dataclass_fields__}
     angles = (

@@ -117,7 +117,7 @@ class Truth:
         shape: its shape coefficients.
     """
 
-    angles: Float[np.ndarray, "t 20"]
+    angles: Float[np.ndarray, "t j"]
     wrist_position: Float[np.ndarray, "t 3"]
     wrist_quaternion: Float[np.ndarray, "t 4"]
     object_pose: Float[np.ndarray, "t 7"]

@@ -41,7 +41,7 @@ class Trial:
 
     person: int
     object: ObjectDescription
-    angles: Float[np.ndarray, "t 20"]
+    angles: Float[np.ndarray, "t j"]
     wrist_position: Float[np.ndarray, "t 3"]
     wrist_rotation: Float[np.ndarray, "t 3 3"]
     object_pose: Float[np.ndarray, "t 7"]
@@ -234,7 +234,7 @@ def _draw_motion(
     )
 
 
-def script_controls(scripts: Sequence[Script], model: mujoco.MjModel) -> Float[np.ndarray, "n t 26"]:
+def script_controls(scripts: Sequence[Script], model: mujoco.MjModel) -> Float[np.ndarray, "n t u"]:
     """Targets at the model's physics rate, all as long as the longest script (the shorter ones hold their last)."""
     step = model.opt.timestep
     time = np.arange(round(max(script.motion.tempo.duration for script in scripts) / step)) * step

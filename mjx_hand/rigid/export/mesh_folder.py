@@ -52,13 +52,13 @@ def write_meshes(rigid: RigidHand, folder: Path, collision: str) -> None:
     """Write each link's surface as `meshes/<link>.obj` (m, link frame), and its hull where `collision` is "hulls"."""
     (folder / MESHES).mkdir()
     for link, vertices, faces in zip(LINKS, rigid.mesh_vertices, rigid.mesh_faces, strict=True):
-        _write_obj(folder / MESHES / f"{link}.obj", vertices, faces)
+        write_obj(folder / MESHES / f"{link}.obj", vertices, faces)
     if collision == "hulls":
         for link, (vertices, faces) in zip(LINKS, convex_hulls(rigid), strict=True):
-            _write_obj(folder / MESHES / f"{hull_name(link)}.obj", vertices, faces)
+            write_obj(folder / MESHES / f"{hull_name(link)}.obj", vertices, faces)
 
 
-def _write_obj(path: Path, vertices: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"]) -> None:
+def write_obj(path: Path, vertices: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"]) -> None:
     """Triangles that share their corners, so that a closed surface stays closed."""
     lines = [f"v {x:.7f} {y:.7f} {z:.7f}" for x, y, z in vertices.tolist()]
     lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]

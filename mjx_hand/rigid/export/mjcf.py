@@ -54,12 +54,13 @@ def hand_spec(
         collision: "capsules", or "hulls", the links' convex hulls.
 
     Raises:
-        InputError: an unknown base or collision shape.
+        InputError: an unknown base or collision shape, or gains of another hand.
     """
     check_collision(collision)
     if base not in BASES:
         raise InputError(f"base is {base!r}; valid: {', '.join(BASES)}")
     gains = Gains() if gains is None else gains
+    gains.check_for(HINGES)
     spec = mujoco.MjSpec()
     spec.modelname = f"{prefix}{file_stem(rigid)}"
     spec.compiler.degree = False

@@ -1,0 +1,116 @@
+"""Grip offsets of any body, by MuJoCo's own distances and Jacobians; as `envs.grip` has them for a human hand."""
+
+from collections.abc import Iterator, Sequence
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+from scipy.special import expit
+
+from envs.scene import NUM_WRIST, OBJECT, demonstration_model
+from mjx_hand.bodies.body import Body
+from mjx_hand.bodies.coordinates import coordinates_per_target, hand_coordinates
+from mjx_hand.motion.demonstration import Demonstration
+from mjx_hand.rigid.gains import Gains
+
+_NEAR = 0.007  # m: a link nearer than this is taken to touch
+_SHARP = 0.001  # m, over which that fades
+_FAR = 0.02  # m, beyond which nobody asks how far
+_DAMPING = 0.01  # m/rad, of the step that closes gaps
+
+
+class Touch:
+    """Where a hand and an object are nearest to each other, link by link, in one scene.
+
+    Attributes:
+        links: those of fingers that have a shape to touch with.
+        fingers: of each of them.
+    """
+
+    def __init__(self, model: mujoco.MjModel, body: Body):
+        self.model, self.data = model, mujoco.MjData(model)
+        self.links = tuple(dict.fromkeys(c.link for c in body.contacts if c.finger))
+        self.fingers = tuple(next(c.finger for c in body.contacts if c.link == link) for link in self.links)
+        self._hand = [[model.geom(c.name).id for c in body.contacts if c.link == link] for link in self.links]
+        self._bodies = [model.body(link).id for link in self.links]
+        self._object = np.flatnonzero(model.geom_bodyid == model.body(OBJECT).id).tolist()
+
+    def place(self, coordinates: Float[np.ndarray, "m"], object_pose: Float[np.ndarray, "7"]) -> None:
+        """Put hand and object somewhere."""
+        self.data.qpos[: len(coordinates)], self.data.qpos[len(coordinates) :] = coordinates, object_pose
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_comPos(self.model, self.data)
+
+    def nearest(self, most: float = _FAR) -> Iterator[tuple[int, float, np.ndarray, np.ndarray]]:
+        """Of each link that is nearer than `most` (m): its number, the gap, its point there, and the way in (world)."""
+        ends = np.zeros(6)
+        for number, geoms in enumerate(self._hand):
+            best: tuple[float, np.ndarray] | None = None
+            for geom in geoms:
+                for other in self._object:
+                    gap = mujoco.mj_geomDistance(self.model, self.data, geom, other, most, ends)
+                    if gap < most and (best is None or gap < best[0]):
+                        best = gap, ends.copy()
+            if best is not None and abs(best[0]) > 1e-9:
+                gap, found = best
+                yield number, gap, found[:3], (found[3:] - found[:3]) / gap
+
+    def jacobian(self, number: int, point: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 m"]:
+        """How a point (m, world) of a link moves with the hand's coordinates."""
+        jacobian = np.zeros((3, self.model.nv))
+        mujoco.mj_jac(self.model, self.data, jacobian, None, point, self._bodies[number])
+        return jacobian[:, : self.model.nv - 6]
+
+
+def model_grips(
+    demonstrations: Sequence[Demonstration],
+    bodies: Sequence[Body],
+    targets: Float[np.ndarray, "d t u"],
+    forces: Float[np.ndarray, "d"],
+    gains: Gains,
+) -> Float[np.ndarray, "d t u"]:
+    """The grip (rad) of each demonstration at a force (N); NaN leaves it as it is.
+
+    As `envs.grip.grip_offsets`: one damped step that closes the gaps of links that touch, and J^T f / kp, where the
+    opposing fingers press with the force and the others share as much.
+    """
+    grips = np.zeros_like(targets)
+    for k, (d, body) in enumerate(zip(demonstrations, bodies, strict=True)):
+        if np.isnan(forces[k]):
+            continue
+        model = demonstration_model(d, body)
+        touch, mix = Touch(model, body), coordinates_per_target(model, targets.shape[-1])[:, NUM_WRIST:]
+        coordinates = hand_coordinates(model, targets[k])
+        opposing = np.isin(touch.fingers, body.opposing)
+        for t in range(d.num_frames):
+            touch.place(coordinates[t], d.object_pose[t])
+            grips[k, t, NUM_WRIST:] = _offsets(touch, mix, opposing, float(forces[k]), gains)
+        grips[k, d.num_frames :] = grips[k, d.num_frames - 1]
+    return grips
+
+
+def _offsets(
+    touch: Touch, mix: Float[np.ndarray, "m j"], opposing: np.ndarray, force: float, gains: Gains
+) -> Float[np.ndarray, "j"]:
+    """Offsets (rad) of the actuated joints where hand and object are now."""
+    found = list(touch.nearest())
+    if not found:
+        return np.zeros(mix.shape[1])
+    numbers = np.array([number for number, *_ in found])
+    gaps = np.array([gap for _, gap, *_ in found])
+    touching = expit((_NEAR - gaps) / _SHARP)
+    rows = np.stack([inward @ touch.jacobian(number, point) @ mix for number, _, point, inward in found])
+    fingers = np.array(touch.fingers)[numbers]
+    names = list(dict.fromkeys(touch.fingers))
+    of_finger = (fingers[:, None] == np.array(names)).astype(float)  # (links, fingers)
+    leads = np.array([opposing[touch.fingers.index(name)] for name in names])
+    phalanges = touching @ of_finger  # how many of each finger touch
+    touches = np.minimum(phalanges, 1.0)
+    rest, ahead = (touches / max(float(touches[side].sum()), 1.0) for side in (~leads, leads))
+    of_hand = np.where(leads, ahead, rest)
+    share = touching * (of_finger @ (of_hand / np.maximum(phalanges, 1.0)))
+    torque = (force * share) @ rows
+    closing = rows * touching[:, None]
+    square = closing @ closing.T + _DAMPING**2 * np.eye(len(rows))
+    step = closing.T @ np.linalg.solve(square, gaps * touching)
+    return step + np.clip(torque, -gains.force_limit, gains.force_limit) / gains.stiffness

@@ -1,0 +1,1 @@
+"""Hands as physics and learning have them, human and robot."""
