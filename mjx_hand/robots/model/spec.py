@@ -101,7 +101,7 @@ def model_links(hand: HandLinks, collision: str, absent: str = "refuse") -> tupl
         solid = shapes_of(hand.path, link.name, given)
         if not solid and absent == "bones":
             solid = bones([below.place[:3, 3] for below in hand.links if below.parent == link.name])
-        seen = [each for each in link.source.visuals if not solid or is_there(hand.path, each)]
+        seen = [each for each in link.source.visuals if is_there(hand.path, each)]
         visual = shapes_of(hand.path, link.name, seen)
         solid = tuple(hull(each) for each in solid)
         touching = tuple(map(capsule, solid)) if collision == "capsules" else solid
