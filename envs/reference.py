@@ -75,11 +75,9 @@ def make_reference(
     frames = max(d.num_frames for d in demonstrations)
     targets, poses, bases = [], [], []
     for d in demonstrations:
-        base = base_rotation(d)
-        wrist = wrist_coordinates(d.motion.wrist_position, d.motion.wrist_quaternion, base)
-        targets.append(_padded(np.concatenate([wrist, d.motion.angles], axis=1), frames))
+        targets.append(_padded(demonstrated_targets(d), frames))
         poses.append(_padded(d.object_pose, frames))
-        bases.append(base)
+        bases.append(base_rotation(d))
     targets = jnp.asarray(np.stack(targets), jnp.float32)
     grip = grip_table(demonstrations, hands, targets, np.where(forces > 0, forces, np.nan), gains)
     features = [[*d.object.size, d.object.mass, d.object.friction, *_one_of_kinds(d)] for d in demonstrations]
@@ -93,6 +91,13 @@ def make_reference(
         features=jnp.asarray(features, jnp.float32),
         length=jnp.array([d.num_frames for d in demonstrations]),
     )
+
+
+def demonstrated_targets(demonstration: Demonstration) -> Float[np.ndarray, "t u"]:
+    """The wrist's slides and turns and the joints (m, rad) of a demonstration, in its scene."""
+    motion = demonstration.motion
+    wrist = wrist_coordinates(motion.wrist_position, motion.wrist_quaternion, base_rotation(demonstration))
+    return np.concatenate([wrist, motion.angles], axis=1)
 
 
 def cached_reference(

@@ -8,7 +8,6 @@ from jaxtyping import Float
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import numbers, text
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
-from mjx_hand.hand.joints import HINGES
 from mjx_hand.motion.joint_motion import JointMotion, joint_motion_of
 from mjx_hand.objects.description import OBJECT_KINDS, ObjectDescription
 from mjx_hand.pytree import pytree, static
@@ -74,7 +73,7 @@ def save_demonstration(demonstration: Demonstration, path: str | Path) -> None:
             "wrist_quaternion": m.wrist_quaternion,
             "valid": m.valid,
             "side": m.side,
-            "joint_names": np.array(HINGES),
+            "joint_names": np.array(m.joint_names),
             "object_pose": d.object_pose,
             "object_kind": d.object.kind,
             "object_size": d.object.size,

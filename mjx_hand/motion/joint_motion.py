@@ -24,27 +24,29 @@ LAYOUT: dict[str, tuple[int | str, ...]] = {
 
 @pytree
 class JointMotion:
-    """Hinge angles over time; radians, metres, quaternions wxyz.
+    """A hand's joints over time; radians, metres, quaternions wxyz.
 
     Attributes:
         fps: frames per second.
-        angles: hinge angles in the order of `hand.joints.HINGES`.
+        angles: of its joints, in the order of `joint_names`.
         wrist_position: the wrist joint in the recording's world frame.
         wrist_quaternion: world from hand frame, wxyz.
         valid: False where the recording has a gap; the angles there are interpolated.
         side: "right" or "left".
         source: provenance, one line.
         warnings: what is doubtful about it, one line each.
+        joint_names: the human hand's hinges, or a robot's actuated joints.
     """
 
     fps: float
-    angles: Float[np.ndarray, "t 20"]
+    angles: Float[np.ndarray, "t j"]
     wrist_position: Float[np.ndarray, "t 3"]
     wrist_quaternion: Float[np.ndarray, "t 4"]
     valid: Bool[np.ndarray, "t"]
     side: str = static(default="right")
     source: str = static(default="")
     warnings: Lines = static(default=())
+    joint_names: tuple[str, ...] = static(default=HINGES)
 
     @property
     def num_frames(self) -> int:
@@ -65,7 +67,7 @@ def save_joint_motion(motion: JointMotion, path: str | Path) -> None:
             "wrist_position": motion.wrist_position,
             "wrist_quaternion": motion.wrist_quaternion,
             "valid": motion.valid,
-            "joint_names": np.array(HINGES),
+            "joint_names": np.array(motion.joint_names),
             "side": motion.side,
             "source": motion.source,
         },
