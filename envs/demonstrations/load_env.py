@@ -3,11 +3,14 @@
 from pathlib import Path
 
 from envs.demonstrations.load_set import load_demonstrations
+from envs.demonstrations.on_robot.robot_set import robot_demonstrations
 from envs.demonstrations.set_settings import GIVEN, SetSettings
 from envs.demonstrations.twin_hands import twins
 from envs.disturbances.randomize import Randomize
 from envs.task import Task
 from envs.tracking import TrackingEnv
+from mjx_hand.bodies.human_body import HUMAN
+from mjx_hand.bodies.robot_body import robot_body
 from mjx_hand.errors import InputError
 
 
@@ -19,6 +22,7 @@ def load(
     root: str | Path = "outputs/demonstrations",
     folder: str | Path | None = None,
     randomize: Randomize | None = None,
+    hand: str = HUMAN,
 ) -> TrackingEnv:
     """The tracking environment over the demonstrations of a grasp type, or over a folder of finished ones.
 
@@ -35,6 +39,7 @@ def load(
         root: folder below which demonstration sets are kept.
         folder: of `train/NNN.npz` and `heldout/NNN.npz`, or of `NNN.npz` (`mjx_hand.save_demonstration` writes them).
         randomize: what disturbs its episodes, such as `envs.Randomize(share=1.0)`; None for nothing.
+        hand: "human", the name of a robot hand, or the path of its description.
 
     Raises:
         InputError: a type and a folder, or neither; a set that is not made; an empty folder; or as `TrackingEnv`.
@@ -42,7 +47,7 @@ def load(
     if bool(grasp) == (folder is not None):
         raise InputError(f"grasp is {grasp!r} and folder {folder}; give one of them")
     settings = SetSettings(grasp) if folder is None else SetSettings(GIVEN, folder=str(folder))
-    return env_of_set(settings, part, engine, task, root, randomize)
+    return env_of_set(settings, part, engine, task, root, randomize, hand)
 
 
 def env_of_set(
@@ -52,6 +57,7 @@ def env_of_set(
     task: Task | None,
     root: str | Path,
     randomize: Randomize | None = None,
+    hand: str = HUMAN,
 ) -> TrackingEnv:
     """The environment over one part of any set, as `load`.
 
@@ -59,4 +65,8 @@ def env_of_set(
         InputError: as `load`.
     """
     demonstrations = load_demonstrations(settings, part, root)
-    return TrackingEnv(demonstrations, twins(demonstrations), engine, task, randomize=randomize)
+    if hand == HUMAN:
+        return TrackingEnv(demonstrations, twins(demonstrations), engine, task, randomize=randomize)
+    body = robot_body(hand)
+    brought = robot_demonstrations(demonstrations, body)
+    return TrackingEnv(brought, [body] * len(brought), engine, task, randomize=randomize)

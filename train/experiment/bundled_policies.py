@@ -5,6 +5,7 @@ from pathlib import Path
 
 from envs.demonstrations.twin_hands import twins
 from envs.tracking import TrackingEnv
+from mjx_hand.bodies.human_body import HUMAN
 from mjx_hand.motion.demonstration import load_demonstration
 from train.experiment.setup import chosen_path
 from train.settings.config import Config
@@ -33,7 +34,7 @@ def with_policy(config: Config) -> tuple[Config, bool]:
     """The configuration with the policy to use: its own, or where nothing is trained, and one comes with the project,
     that one; and whether it is that one."""
     included = bundled_policy(config.name)
-    if config.checkpoint or included is None or chosen_path(config).is_file():
+    if config.checkpoint or config.hand != HUMAN or included is None or chosen_path(config).is_file():
         return config, False
     print(f"nothing is trained in {config.out}: taking the policy that comes with mjx-hand", flush=True)
     return dataclasses.replace(config, checkpoint=str(included)), True

@@ -36,7 +36,7 @@ def load_env(config: Config, part: str, randomize: Randomize | None = None) -> T
     """
     if part == "heldout" and config.data.folder and not is_divided(config.data.folder):
         print(f"{config.data.folder} holds no demonstrations out: these are the ones for training", flush=True)
-    return env_of_set(config.data, part, config.engine, config.task, config.demonstrations, randomize)
+    return env_of_set(config.data, part, config.engine, config.task, config.demonstrations, randomize, config.hand)
 
 
 def training_env(config: Config) -> TrackingEnv:

@@ -9,6 +9,7 @@ from typing import Any
 
 from envs.observation import observed_features
 from envs.tracking import TrackingEnv
+from mjx_hand.bodies.human_body import HUMAN
 from mjx_hand.errors import InputError
 from mjx_hand.player.exported_policy import ExportedPolicy, save_exported_policy
 from mjx_hand.rigid.export.mesh_folder import filling
@@ -35,6 +36,8 @@ def export_policy(config: Config) -> Path:
     Raises:
         InputError: no policy, one of another task, or a folder that cannot be written.
     """
+    if config.hand != HUMAN:
+        raise InputError(f"hand is {config.hand!r}; policies of the human hand alone are exported: give hand=human")
     if "onnx" in config.export.to:
         check_onnx()
     config, included = with_policy(config)

@@ -19,8 +19,10 @@ from envs.disturbances.randomize import Randomize
 from envs.physics import ENGINES
 from envs.settings import from_dict
 from envs.task import Task
+from mjx_hand.bodies.human_body import HUMAN
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError, reason_of
+from mjx_hand.robots.robot_hand import load_robot
 from train.settings.device import DEVICES, use_device
 from train.settings.options import Checks, Debug, Distributed, Export, Play, Ppo
 from train.settings.overrides import completed, old_names, options_given
@@ -36,6 +38,7 @@ class Config:
     Attributes:
         name: of the experiment.
         engine: auto, native, mjx or warp; auto picks by the device (docs/training.md).
+        hand: human, a robot hand's name (docs/robots.md), or the path of its description.
         device: cpu or gpu: what JAX computes on, and with it how many worlds (`configs/device`).
         seed: of networks, resets and actions.
         seeds: for commands that take several seeds of one experiment; empty for `seed` alone.
@@ -57,6 +60,7 @@ class Config:
 
     name: str = "pinch"
     engine: str = "auto"
+    hand: str = HUMAN
     device: str = "cpu"
     seed: int = 0
     seeds: tuple[int, ...] = ()
@@ -78,6 +82,8 @@ class Config:
     def __post_init__(self):
         if self.engine not in ("auto", *ENGINES):
             raise InputError(f"engine is {self.engine!r}; valid: auto, {', '.join(ENGINES)}")
+        if self.hand != HUMAN:
+            load_robot(self.hand)
         if not self.out.strip():
             raise InputError("out is empty; give the folder to write to, such as out=outputs/pinch/seed0")
         for seed in (self.seed, *self.seeds):

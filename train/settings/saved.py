@@ -40,7 +40,7 @@ _FREE = (
     "ppo.num_timesteps",
 )
 _PLACES = ("demonstrations", "data.folder")  # taken from the run all the same where nothing else is given
-_POLICY = ("name", "data", "task", "ppo.policy_layers")  # what a policy cannot do without
+_POLICY = ("name", "data", "hand", "task", "ppo.policy_layers")  # what a policy cannot do without
 _FREE_OF_POLICY = ("engine",)  # any engine may play it
 
 Settings = Mapping[str, Any]

@@ -7,6 +7,7 @@ import numpy as np
 from envs.evaluation.rollout import Rollouts
 from envs.scene import demonstration_model
 from envs.tracking import TrackingEnv
+from mjx_hand.bodies.coordinates import hand_coordinates
 from mjx_hand.view.report import Film
 from mjx_hand.view.video.renderer import RendererUnavailable
 from mjx_hand.view.video.video import beside, render_frames, write_video
@@ -34,7 +35,9 @@ def side_by_side(env: TrackingEnv, rollouts: Rollouts, index: int, path: str | P
     model = demonstration_model(demonstration, env.hands[which], visual=True)
     frames = np.flatnonzero(rollouts.counted[index])[:: max(round(rollouts.fps / _RATE), 1)]
     targets = np.asarray(env.reference.targets)[which]
-    wanted = np.concatenate([targets[frames], rollouts.object_reference[index, frames]], axis=1)
+    wanted = np.concatenate(
+        [hand_coordinates(model, targets[frames]), rollouts.object_reference[index, frames]], axis=1
+    )
     done = rollouts.qpos[index, frames]
     size = (480, 480)
     left = render_frames(model, wanted, size=size, caption="demonstration")

@@ -1,0 +1,101 @@
+"""A person's pinch on an Allegro hand, 1.6 times as large and with four fingers: contacts coincide."""
+
+import dataclasses
+
+import mujoco
+import numpy as np
+import pytest
+
+from envs.demonstrations.load_env import env_of_set
+from envs.demonstrations.on_robot.bring import on_robot
+from envs.demonstrations.on_robot.follow import solve
+from envs.demonstrations.on_robot.pads import demonstrated_pads
+from envs.demonstrations.set_settings import SetSettings
+from envs.reference import demonstrated_targets
+from envs.scene import OBJECT, demonstration_model
+from mjx_hand.bodies.robot_body import robot_body
+from mjx_hand.errors import InputError
+from tests.robots.urdfs import urdf_of
+
+FINGERS = ("thumb", "index", "middle")
+
+
+@pytest.fixture(scope="module")
+def allegro():
+    assert urdf_of("allegro").is_file()  # skips without the package that carries it
+    return robot_body("allegro")
+
+
+@pytest.fixture(scope="module")
+def brought(demonstrations, hands, allegro):
+    return on_robot(demonstrations[0], hands[0], allegro)
+
+
+def test_least_squares_stay_within_limits():
+    """The nearest point of a box to a point outside is known."""
+    wanted = np.array([2.0, 0.3])
+    found, cost = solve(lambda x: (x - wanted, np.eye(2)), np.zeros(2), np.full(2, -1.0), np.ones(2), 50)
+    np.testing.assert_allclose(found, [1.0, 0.3], atol=1e-6)
+    assert cost == pytest.approx(0.5)
+
+
+def test_the_pads_are_those_of_the_pinch(demonstrations, hands):
+    """Thumb, index and middle finger; at the grasp on the cube's faces, which they move with from then on."""
+    d = demonstrations[0]
+    pads = demonstrated_pads(d, hands[0])
+    assert pads.fingers == FINGERS
+    centre = d.object_pose[pads.grasp, :3]
+    reach = np.linalg.norm(pads.places[pads.grasp] - centre, axis=1)
+    assert (reach > 0.9 * d.object.size[0]).all()
+    assert (reach < 1.8 * d.object.size[0]).all()
+    towards = (centre - pads.places[pads.grasp]) / reach[:, None]
+    assert (np.sum(towards * pads.inward, axis=1) > 0.5).all()
+
+
+def test_fingers_touch_where_the_persons_do(brought, demonstrations, allegro):
+    """By MuJoCo's distances in the robot's own scene, while the object is carried: on the surface, and not inside."""
+    assert brought.fingers == FINGERS
+    assert brought.off.max() < 0.012
+    assert brought.depth < 0.002
+    d = brought.demonstration
+    model = demonstration_model(d, allegro)
+    data, targets = mujoco.MjData(model), demonstrated_targets(d)
+    thing = [g for g in range(model.ngeom) if model.geom_bodyid[g] == model.body(OBJECT).id]
+    high = np.flatnonzero(d.object_pose[:, 2] - d.object_pose[0, 2] > 0.03)
+    for frame in high[:: max(len(high) // 5, 1)]:
+        data.qpos[:] = np.concatenate([targets[frame], d.object_pose[frame]])
+        mujoco.mj_kinematics(model, data)
+        for finger in FINGERS:
+            geoms = [model.geom(c.name).id for c in allegro.contacts if c.finger == finger]
+            gap = min(mujoco.mj_geomDistance(model, data, a, b, 0.1, None) for a in geoms for b in thing)
+            assert -0.003 < gap < 0.004, (frame, finger)
+    np.testing.assert_array_equal(d.object_pose, demonstrations[0].object_pose)
+
+
+def test_the_hand_moves_smoothly_and_within_its_limits(brought, allegro):
+    motion = brought.demonstration.motion
+    assert motion.joint_names == allegro.joints
+    assert np.abs(np.diff(motion.angles, axis=0)).max() * motion.fps < 5.0  # rad/s
+    model = demonstration_model(brought.demonstration, allegro)
+    low, high = model.actuator_ctrlrange[6:22].T
+    assert (motion.angles >= low - 1e-9).all()
+    assert (motion.angles <= high + 1e-9).all()
+
+
+def test_a_hand_of_the_other_side_is_refused(demonstrations, hands, allegro):
+    left = dataclasses.replace(allegro, side="left")
+    with pytest.raises(InputError, match="the demonstration is of a right hand, 'allegro' is a left one"):
+        on_robot(demonstrations[0], hands[0], left)
+
+
+def test_an_environment_of_a_robot_by_its_name(set_path, brought):
+    """What it is to follow is what was brought onto it; its actions are as many as its actuators."""
+    env = env_of_set(SetSettings("given", folder=str(set_path)), "train", "native", None, set_path, hand="allegro")
+    assert env.action_size == 6 + 16
+    length = brought.demonstration.num_frames
+    wanted = demonstrated_targets(brought.demonstration)
+    np.testing.assert_allclose(np.asarray(env.reference.targets)[0, :length], wanted, atol=1e-5)
+    held = np.asarray(env.reference.grip)[0, length - 1, 6:]
+    assert np.abs(held).max() > 0.01
+    with pytest.raises(InputError, match="robot is 'allergo'; valid: ability, allegro"):
+        env_of_set(SetSettings("given", folder=str(set_path)), "train", "native", None, set_path, hand="allergo")
