@@ -6,18 +6,18 @@ import json
 from pathlib import Path
 from typing import Any
 
-from envs.demonstrations.from_recording.demonstration import RECORDED
-from envs.demonstrations.from_recording.variations import RecordingSettings
+from envs.demonstrations.recordings.recording_files import recording_digest
+from envs.demonstrations.recordings.recording_settings import RecordingSettings
 from envs.demonstrations.scripted.simulated_capture import CaptureSettings
 from envs.grasps import grasp_names, grasp_type
-from mjx_hand.capture.object_poses.dexmv_object import recording_files
+from envs.grip_force import RECORDED
 from mjx_hand.errors import InputError
 from mjx_hand.objects.mesh_file import mesh_digest
 
 ALL = "all"
 GIVEN = "given"
 _VERSION = 3  # of the generator: a change that makes other demonstrations of the same settings raises it
-_RECORDED_VERSION = 4  # the same of what is made of a recording
+_RECORDED_VERSION = 5  # the same of what is made of a recording
 
 
 @dataclasses.dataclass(frozen=True)
@@ -95,15 +95,10 @@ def set_folder(settings: SetSettings, root: str | Path) -> Path:
         InputError: several or finished sets, which have no such folder, or a recording that is not there.
     """
     ingredients: list[Any] = [_VERSION, fingerprint(settings)]
-    recording = ingredients[1].pop("recording")
+    recording = ingredients[1].pop("recording", None)
     if settings.grasp == RECORDED:
-        files = _recording_files(settings.recording)
-        ingredients = [
-            _RECORDED_VERSION,
-            settings.seed,
-            recording,
-            *(hashlib.sha256(f.read_bytes()).hexdigest() for f in files),
-        ]
+        del recording["path"]  # what it holds tells, not where it is
+        ingredients = [_RECORDED_VERSION, settings.seed, recording, recording_digest(settings.recording.path)]
     else:
         grasp = dataclasses.asdict(grasp_type(settings.grasp))
         del grasp["grip_force"]  # it is the twin's: the same demonstrations are made whatever it is
@@ -116,16 +111,11 @@ def fingerprint(settings: SetSettings) -> dict[str, Any]:
     """All settings that tell sets apart, as in `CaptureSettings.fingerprint`."""
     told = dataclasses.asdict(settings) | {"capture": settings.capture.fingerprint()}
     del told["folder"]  # what it holds tells, not where it is: `load_set.part_digest`
+    if settings.grasp != RECORDED:
+        del told["recording"]
     if settings.object:
         told["object"] = mesh_digest(settings.object)
     else:  # sets from before there were own objects keep their names
         for name in ("object", "object_mass", "object_density"):
             del told[name]
     return told
-
-
-def _recording_files(settings: RecordingSettings) -> tuple[Path, ...]:
-    try:
-        return recording_files(settings.path)
-    except InputError as error:
-        raise InputError(f"{error}: data.recording.path=FOLDER") from None
