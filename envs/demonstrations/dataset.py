@@ -20,7 +20,7 @@ from envs.demonstrations.recordings.recorded_set import recorded_set
 from envs.demonstrations.recordings.recording_page import write_pages
 from envs.demonstrations.recordings.variations import divided
 from envs.demonstrations.scripted.own_object import own_object
-from envs.demonstrations.scripted.simulated_capture import project_recording, record_trials, save_truth
+from envs.demonstrations.scripted.simulated_capture import load_truth, project_recording, record_trials, save_truth
 from envs.demonstrations.scripted.trials import perform_trials
 from envs.demonstrations.set_settings import SetSettings, set_folder
 from envs.grasps import grasp_type
@@ -29,6 +29,7 @@ from mjx_hand.files.npz_archive import replacing
 from mjx_hand.files.working_folder import remove_abandoned, working_folder
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion.demonstration import load_demonstration, save_demonstration
+from mjx_hand.motion.mirror import mirrored_demonstration, mirrored_motion, mirrored_pose
 from mjx_hand.motion.motion import load_motion_file, save_motion
 from mjx_hand.progress import shares
 from mjx_hand.pytree import replace
@@ -70,6 +71,9 @@ def make_set(settings: SetSettings, root: str | Path, report: Report = lambda wh
     with working_folder(folder) as temporary:
         if settings.grasp == RECORDED:
             yields = _make_variations(settings, temporary, report)
+        elif settings.side == "left":
+            right = dataclasses.replace(settings, side="right")
+            yields = _mirror(make_set(right, root, report), temporary)
         elif (usual := dataclasses.replace(settings, capture=settings.capture.projected_as_usual())) != settings:
             yields = _project_again(settings, make_set(usual, root, report), temporary, report)
         else:
@@ -142,6 +146,27 @@ def _project_again(settings: SetSettings, usual: Path, folder: Path, report: Rep
             shutil.copyfile(path.with_suffix(kept), there / (path.stem + kept))
         save_demonstration(replace(demonstration, motion=joints, **hinges), there / path.name)
     return json.loads((usual / YIELD).read_text())
+
+
+def _mirror(right: Path, folder: Path) -> Mapping[str, Mapping[str, int]]:
+    """Make both parts as mirror images of a set's, with their motions and truths; what came of that set's attempts."""
+    for path in (path for part in PARTS for path in demonstration_files(right, part)):
+        there = folder / path.parent.name
+        there.mkdir(exist_ok=True)
+        save_demonstration(mirrored_demonstration(load_demonstration(path)), there / path.name)
+        save_motion(
+            mirrored_motion(load_motion_file(path.with_suffix(".motion.npz"))), there / f"{path.stem}.motion.npz"
+        )
+        truth = load_truth(path.with_suffix(".truth.npz"))
+        wrist = mirrored_pose(np.concatenate([truth.wrist_position, truth.wrist_quaternion], axis=1))
+        mirrored = dataclasses.replace(
+            truth,
+            wrist_position=wrist[:, :3],
+            wrist_quaternion=wrist[:, 3:],
+            object_pose=mirrored_pose(truth.object_pose),
+        )
+        save_truth(mirrored, there / f"{path.stem}.truth.npz")
+    return json.loads((right / YIELD).read_text())
 
 
 def _make_variations(settings: SetSettings, folder: Path, report: Report) -> Mapping[str, Mapping[str, int]]:

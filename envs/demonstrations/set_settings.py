@@ -33,6 +33,8 @@ class SetSettings:
         seed: of every draw; the held-out part uses the next one.
         capture: how they are recorded.
         recording: the real recording, and how it is varied; of the other settings it uses the seed.
+        side: of the hand that scripted grasps are of; a left one's are mirror images of the right one's. A recording
+            has its own.
         folder: of finished demonstrations, as `load_set.load_part` reads it.
         object: a mesh file (m), which scripted grasps grasp in place of the type's objects; its axes are the type's.
         object_mass, object_density: of it, kg or kg/m³; without either the type's range of masses is drawn from.
@@ -45,6 +47,7 @@ class SetSettings:
     seed: int = 0
     capture: CaptureSettings = dataclasses.field(default_factory=CaptureSettings)
     recording: RecordingSettings = dataclasses.field(default_factory=RecordingSettings)
+    side: str = "right"
     folder: str = ""
     object: str = ""
     object_mass: float | None = None
@@ -53,6 +56,13 @@ class SetSettings:
     def __post_init__(self):
         if self.grasp not in (ALL, RECORDED, GIVEN):
             grasp_type(self.grasp)
+        if self.side not in ("right", "left"):
+            raise InputError(f"data.side is {self.side!r}; valid: right, left")
+        if self.side != "right" and self.grasp in (RECORDED, GIVEN):
+            raise InputError(
+                f"data.side is {self.side!r} and data.grasp {self.grasp!r}; it is of scripted grasps, "
+                "a recording's hand is chosen by data.recording.side"
+            )
         if (self.grasp == GIVEN) != bool(self.folder):
             raise InputError(
                 f"data.grasp is {self.grasp!r} and data.folder {self.folder!r}; give data.folder=PATH alone for "
@@ -113,6 +123,8 @@ def fingerprint(settings: SetSettings) -> dict[str, Any]:
     del told["folder"]  # what it holds tells, not where it is: `load_set.part_digest`
     if settings.grasp != RECORDED:
         del told["recording"]
+    if settings.side == "right":  # sets from before there were left ones keep their names
+        del told["side"]
     if settings.object:
         told["object"] = mesh_digest(settings.object)
     else:  # sets from before there were own objects keep their names

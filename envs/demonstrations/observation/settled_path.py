@@ -79,9 +79,13 @@ def settled_path(
         fps: frames per second.
     """
     good = _credible(path, labels, hand_rotation)
-    rotation = quaternion_matrices(fill_turns(matrix_quaternions(path.rotation), good)) if not good.all() else None
-    rotation = path.rotation if rotation is None else rotation
+    rotation = _bridged(path.rotation, good)
     rests = _rests(path, rotation, labels, solid)
+    if path.noisy:  # from how it stands to how it lies in the hand by the shortest turn
+        known = path.rotation.copy()
+        for rest in rests:
+            known[rest.begin : rest.end] = rest.rotation
+        rotation = _bridged(known, good | (labels == RESTS))
     low = min(rest.level for rest in rests)
     origin = np.array([*rests[0].position[:2], low])
     moved, turned = np.zeros((len(labels), 3)), np.tile(np.eye(3), (len(labels), 1, 1))
@@ -150,12 +154,16 @@ def _credible(path: ObjectPath, labels: Int[np.ndarray, "t"], hand: Float[np.nda
     return good if good.any() else np.ones(len(labels), bool)
 
 
+def _bridged(rotation: Float[np.ndarray, "t 3 3"], good: np.ndarray) -> Float[np.ndarray, "t 3 3"]:
+    return rotation if good.all() else quaternion_matrices(fill_turns(matrix_quaternions(rotation), good))
+
+
 def _rests(path: ObjectPath, rotation: np.ndarray, labels: np.ndarray, solid: Solid) -> list[Rest]:
     found = []
     for a, b in spans(labels == RESTS):
         middle = (a + b) // 2
         mean = rotation[middle] if path.noisy else mean_rotations(rotation[a:b], 2 * (b - a) + 1)[(b - a) // 2]
-        flat, stand = _flat(mean, solid)
+        flat, stand = _flat(mean, path.rotation[a:b, 2].mean(axis=0), solid)
         place = np.median(path.position[a:b], axis=0)
         level = float(np.median(path.position[a:b, 2] + solid.lowest(rotation[a:b], _UP)))
         found.append(Rest(a, b, place, flat, level, stand))
@@ -170,17 +178,23 @@ def _rests(path: ObjectPath, rotation: np.ndarray, labels: np.ndarray, solid: So
     return out
 
 
-def _flat(rotation: Float[np.ndarray, "3 3"], solid: Solid) -> tuple[np.ndarray, np.ndarray | None]:
-    """The orientation nearest to one in which it stands flat on a face, and up in its own frame."""
+def _flat(rotation: np.ndarray, up: np.ndarray, solid: Solid) -> tuple[np.ndarray, np.ndarray | None]:
+    """The orientation nearest to one in which it stands flat on a face, and up in its own frame.
+
+    Args:
+        rotation: of the object.
+        up: the mean of up in its own frame while it stands, which turns about that do not change.
+        solid: its surface.
+    """
     if not len(solid.stands):
         return rotation, None
-    axis = solid.stands[int(np.argmax(rotation[2] @ solid.stands.T))]
+    axis = solid.stands[int(np.argmax(solid.stands @ up))]
+    if axis @ up < np.cos(_LEANS) * np.linalg.norm(up):
+        return rotation, None
     tilted = rotation @ axis
     turn = np.cross(tilted, _UP)
     size = np.linalg.norm(turn)
     angle = np.arctan2(size, tilted @ _UP)
-    if angle > _LEANS:
-        return rotation, None
     return Rotation.from_rotvec(turn / max(size, 1e-12) * angle).as_matrix() @ rotation, axis
 
 

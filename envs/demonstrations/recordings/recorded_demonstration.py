@@ -65,6 +65,7 @@ class Figures:
         carried: share of its frames up to which the twin carries it with nothing learned, and the frame.
         lost: the frame in which it is lost then; null where it is not.
         road: how the twin came to carry it.
+        mirrored: whether the demonstration is the recording's mirror image, for a set that most of is the other hand's.
     """
 
     name: str
@@ -94,6 +95,7 @@ class Figures:
     carried: float = 0.0
     lost: int | None = None
     road: str = ""
+    mirrored: bool = False
 
 
 @dataclasses.dataclass(frozen=True)

@@ -14,6 +14,7 @@ from envs.demonstrations.recordings.recording_files import recordings_of
 from envs.demonstrations.recordings.recording_settings import RecordingSettings
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import Demonstration
+from mjx_hand.motion.mirror import mirrored_demonstration
 from mjx_hand.pytree import replace
 from mjx_hand.retarget.hands import KinematicHands
 
@@ -74,6 +75,7 @@ def recorded_set(settings: RecordingSettings, report: Report = lambda what, shar
             continue
         demonstrations.append(better)
         figures.append(dataclasses.replace(told, road=SEARCHED))
+    demonstrations, figures = _of_one_hand(demonstrations, figures)
     if not demonstrations:
         raise InputError(_none(settings.path, refused))
     return RecordedSet(demonstrations, figures, refused)
@@ -92,6 +94,19 @@ def _readable(
                 raise
             refused.append((path.stem, str(error)))
     return found, refused
+
+
+def _of_one_hand(
+    demonstrations: Sequence[Demonstration], figures: Sequence[Figures]
+) -> tuple[list[Demonstration], list[Figures]]:
+    """All by the hand that most are of, the others as mirror images: a policy is one hand's."""
+    sides = [d.motion.side for d in demonstrations]
+    most = "left" if sides.count("left") > sides.count("right") else "right"
+    other = [side != most for side in sides]
+    return (
+        [mirrored_demonstration(d) if turn else d for d, turn in zip(demonstrations, other, strict=True)],
+        [dataclasses.replace(f, mirrored=turn) for f, turn in zip(figures, other, strict=True)],
+    )
 
 
 def _with_pieces(demonstration: Demonstration, pieces: int) -> Demonstration:

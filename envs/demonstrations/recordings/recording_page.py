@@ -68,6 +68,7 @@ def _steps(f: Figures, d: Demonstration) -> list[tuple[str, str]]:
         ("hand", f"moved {1e3 * f.hand_moved:.1f} mm, turned {np.rad2deg(f.hand_turned):.1f}°, on average"),
         ("hinges", f"moved {np.rad2deg(f.angles_moved):.1f}° on average"),
         ("grasp", f.road),
+        ("twin's hand", "the other one, mirrored: most recordings are of that" if f.mirrored else f.side),
         ("length", f"{d.num_frames / d.motion.fps:.2f} s at {d.motion.fps:g}/s"),
     ]
 

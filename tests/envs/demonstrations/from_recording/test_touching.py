@@ -54,7 +54,9 @@ def test_tips_that_touch_lie_on_the_surface_and_nothing_is_inside(pinch):
 
 def test_a_hand_that_is_away_stays_as_it_was(pinch):
     hand, planes, angles, rotation, position = pinch
-    lies = HandOnObject(np.tile(angles, (8, 1)), np.tile(rotation, (8, 1, 1)), np.tile(position + [0, -0.3, 0], (8, 1)))
+    lies = HandOnObject(
+        np.tile(angles, (8, 1)), np.tile(rotation, (8, 1, 1)), np.tile(position - np.array([0, 0.3, 0]), (8, 1))
+    )
     held = corrected(lies, np.zeros((8, 5)), hand, planes, FPS, 6.0)
     np.testing.assert_allclose(held.angles, lies.angles, atol=1e-4)
     np.testing.assert_allclose(held.position, lies.position, atol=1e-5)

@@ -21,9 +21,10 @@ TWICE = [(1.5, 2.3, [0, 0, 0.12]), (2.3, 3.0, [0, 0.2, -0.04]), (4.4, 5.2, [0, 0
 HANDS = KinematicHands()
 
 
-def hand_with(box: np.ndarray, at: float, off: float, side: str = "right", mirrored: float = 1.0):
-    """A hand that comes to the box by `at` (s) and leaves it from `off` on."""
+def hand_with(box: np.ndarray, at: float, off: float, side: str = "right", mirrored: float = 1.0, again: float = 0.0):
+    """A hand that comes to the box by `at` (s) and leaves it from `off` on, and again from `again` on, for good."""
     near = smooth(TIMES, at - 0.6, at) * (1 - smooth(TIMES, off, off + 0.6))
+    near = np.maximum(near, smooth(TIMES, again - 0.6, again)) if again else near
     offset = AWAY + near[:, None] * (AT - AWAY)
     return motion(box + offset * [mirrored, 1, 1], side)
 
@@ -39,7 +40,7 @@ def settled(handled):
 def test_an_object_that_is_put_down_higher_and_taken_again_rests_twice():
     rng = np.random.default_rng(0)
     box = UP + way(TIMES, TWICE)
-    hand = hand_with(box, 1.4, 5.6)
+    hand = hand_with(box, 1.4, 3.0, again=4.3)
     noise = rng.normal(scale=2e-4, size=box.shape)
     handled = handled_object(scene(box + noise, [hand]), "made up", HANDS)
     assert handled.name == "box"
