@@ -28,7 +28,7 @@ def falling() -> Demonstration:
     """A hand below a wedge, which falls into it."""
     rng = np.random.default_rng(0)
     wedge = np.array([[0, 0, 0], [0.05, 0, 0], [0, 0.06, 0], [0, 0, 0.04], [0.05, 0.01, 0.03]]) - 0.02
-    turn = Rotation.from_rotvec([2.9, 0.2, -0.1])
+    turn = Rotation.from_rotvec([-1.5, 0.1, -0.1])
     return Demonstration(
         motion=JointMotion(
             fps=50.0,
@@ -78,13 +78,15 @@ def test_the_left_hand_does_in_the_engine_what_the_right_one_does(falling):
         data.qpos[6:26] = data.ctrl[6:26] = d.motion.angles[0]
         base = Rotation.from_quat(d.motion.wrist_quaternion[0], scalar_first=True)
         data.qpos[:3] = data.ctrl[:3] = base.inv().apply(d.motion.wrist_position[0])
-        mujoco.mj_step(model, data, 60)
-        touched = data.ncon
+        touched = 0
+        for _ in range(40):
+            mujoco.mj_step(model, data)
+            touched += data.ncon
         ends[d.motion.side] = tips, data.qpos[-7:-4].copy(), data.qpos[6:26].copy(), touched
     np.testing.assert_allclose(ends["left"][0], ends["right"][0] * [-1, 1, 1], atol=1e-4)
     assert ends["right"][3] > 0
-    assert ends["right"][1][2] < 0.165  # it fell
-    np.testing.assert_allclose(ends["left"][1], ends["right"][1] * [-1, 1, 1], atol=1e-3)
+    assert ends["right"][1][2] < 0.16  # it fell
+    np.testing.assert_allclose(ends["left"][1], ends["right"][1] * [-1, 1, 1], atol=2e-3)
     np.testing.assert_allclose(ends["left"][2], ends["right"][2], atol=0.02)
 
 

@@ -12,11 +12,13 @@ from mjx_hand.files.array_cache import cached
 from mjx_hand.motion.scene import NO_SURFACE, RecordedObject
 from mjx_hand.objects.convex_decomposition import convex_pieces
 from mjx_hand.objects.mesh_file import check_object_size
+from mjx_hand.objects.primitives import hull_planes
 
 _DIRECTIONS, _CORNERS = 400, 96  # of an outline; corners of a piece that was convex already
 _CONVEX, _CONCAVITY = 0.97, 0.05  # share of its hull's volume that a convex mesh has; of what is cut
 # Rad within which faces are one, and ways to stand are; m by which a foot is uneven; as many ways to stand: a ball.
 _SAME, _APART, _FLAT, _ROUND = np.deg2rad(8.0), np.deg2rad(25.0), 0.003, 32
+_FOOT_CORNERS = 12
 _SPACING = 0.006  # m between samples of a surface, at most
 _SMALL = 0.1  # a piece that is there only for its number, as a share of the piece that it is in
 
@@ -97,6 +99,33 @@ def as_many(hulls: Float[np.ndarray, "h c 3"], count: int) -> Float[np.ndarray, 
     middle = hulls[0].mean(axis=0)
     small = middle + _SMALL * (hulls[0] - middle)
     return np.concatenate([hulls, np.repeat(small[None], count - len(hulls), axis=0)])
+
+
+def with_foot(
+    hulls: Float[np.ndarray, "h c 3"], solid: Solid, stand: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "h k 3"]:
+    """The pieces with the flat foot on which the object stands: few corners of few pieces make it none.
+
+    Args:
+        hulls: corners of its pieces.
+        solid: its surface.
+        stand: up in its own frame.
+    """
+    reach = solid.outline @ stand
+    lowest = reach.min()
+    x = np.cross(stand, np.eye(3)[np.argmin(np.abs(stand))])
+    axes = np.stack([x / np.linalg.norm(x), np.cross(stand, x) / np.linalg.norm(x)])
+    turn = np.linspace(0, 2 * np.pi, _FOOT_CORNERS, endpoint=False)
+    foot = solid.outline[reach < lowest + _FLAT]
+    corners = foot[np.unique(np.argmax(foot @ axes.T @ np.stack([np.cos(turn), np.sin(turn)]), axis=0))]
+    corners = corners - ((corners @ stand) - lowest)[:, None] * stand
+    planes = hull_planes(hulls)
+    off = (np.einsum("ck,hfk->chf", corners, planes[..., :3]) + planes[..., 3]).max(axis=-1)
+    low = hulls @ stand
+    flat = hulls - np.where(low < lowest + _FLAT, low - lowest, 0.0)[..., None] * stand
+    extra = np.repeat(flat[:, -1:], len(corners), axis=1)
+    extra[np.argmin(off, axis=1), np.arange(len(corners))] = corners
+    return np.concatenate([flat, extra], axis=1)
 
 
 def _mesh(recorded: RecordedObject) -> trimesh.Trimesh:

@@ -22,7 +22,7 @@ from envs.demonstrations.from_recording.touching import (
 )
 from envs.demonstrations.observation.scene_in_world import Handled, handled_object
 from envs.demonstrations.observation.settled_path import support_boxes
-from envs.demonstrations.observation.solids import pieces_of
+from envs.demonstrations.observation.solids import pieces_of, with_foot
 from envs.demonstrations.recordings.observed_grasp import ObservedGrasp, observed_grasp
 from envs.demonstrations.recordings.recording_settings import RecordingSettings
 from envs.grip_force import RECORDED
@@ -37,7 +37,6 @@ from mjx_hand.objects.primitives import hull_planes
 from mjx_hand.retarget.hands import KinematicHands
 
 _DENSITY = 500.0  # kg/m³ where no mass is known: between an empty and a full container
-_FOOT = 0.004  # m above its lowest corner
 
 
 @dataclasses.dataclass(frozen=True)
@@ -214,10 +213,8 @@ def _description(
     solid = handled.solid
     hulls = pieces_of(solid, settings.pieces)
     for rest in observed.settled.rests:
-        if rest.stand is not None:  # what stands has a flat foot, and few corners make it none
-            reach, foot = hulls @ rest.stand, (solid.outline @ rest.stand).min()
-            low = reach < foot + _FOOT
-            hulls[low] -= (reach[low] - foot)[:, None] * rest.stand
+        if rest.stand is not None:
+            hulls = with_foot(hulls, solid, rest.stand)
     if settings.mass is not None:
         mass, how = settings.mass, "given"
     elif settings.density is not None:
