@@ -36,6 +36,7 @@ def files(set_path, tmp_path_factory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_the_tutorials_commands_lead_from_files_to_demonstrations(files, monkeypatch, capsys):
     monkeypatch.chdir(files)
     for command, *arguments in (line[1:] for line in COMMANDS):
