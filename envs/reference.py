@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from envs.grasps import grasp_names, grasp_type
 from envs.grip import grip_offsets
+from envs.grip_force import RECORDED, grip_force_of
 from envs.model_grip import model_grips
 from envs.scene import NUM_WRIST, base_rotation, wrist_coordinates
 from mjx_hand.bodies.body import Body
@@ -64,7 +65,8 @@ def make_reference(
     Args:
         demonstrations: in any order; kinds of object and grasp types may be mixed.
         hands: the twin's hand for each.
-        grip_force: of all (N); 0 replays them as they are, None takes that of each one's grasp type.
+        grip_force: of all (N); 0 replays them as they are, None takes that of each one's grasp type, or what the weight
+            of a recorded object asks for.
         gains: of the hand's position controllers.
 
     Raises:
@@ -210,13 +212,18 @@ def _grip_forces(demonstrations: Sequence[Demonstration], grip_force: float | No
     """The force (N) of each demonstration's grip."""
     if grip_force is not None:
         return np.full(len(demonstrations), grip_force)
-    unknown = sorted({d.grasp for d in demonstrations} - set(grasp_names()))
+    unknown = sorted({d.grasp for d in demonstrations} - {*grasp_names(), RECORDED})
     if unknown:
         raise InputError(
             f"demonstrations of {unknown[0]!r} are of no grasp type ({', '.join(grasp_names())}) that says how hard to "
             "press; give task.grip_force, in newtons"
         )
-    return np.array([grasp_type(d.grasp).grip_force for d in demonstrations])
+    return np.array(
+        [
+            grip_force_of(d.object.mass, d.object.friction) if d.grasp == RECORDED else grasp_type(d.grasp).grip_force
+            for d in demonstrations
+        ]
+    )
 
 
 def _people(hands: Sequence[RigidHand | Body]) -> list[RigidHand] | None:

@@ -17,15 +17,15 @@ from omegaconf import DictConfig, OmegaConf
 from PIL import Image
 
 from envs.demonstrations.contact_sheet import contact_sheet
-from envs.demonstrations.contacts import check_contacts
 from envs.demonstrations.dataset import AS_RECORDED, VARIED, YIELD, make_set
-from envs.demonstrations.from_recording.demonstration import RECORDED
 from envs.demonstrations.load_set import PARTS, load_part
 from envs.demonstrations.quality import check_part
+from envs.demonstrations.recordings.recording_page import RECORDINGS
 from envs.demonstrations.scripted.perform import OUTCOMES
 from envs.demonstrations.scripted.trials import NO_POSTURE, SPARE
 from envs.demonstrations.set_settings import SetSettings
 from envs.demonstrations.twin_hands import twins
+from envs.grip_force import RECORDED
 from envs.settings import from_dict
 from mjx_hand.cli.output import print_table
 from mjx_hand.compile_cache import enable_compile_cache
@@ -88,8 +88,10 @@ def _make_and_show(settings: SetSettings, root: Path) -> None:
     with shares() as report:
         folder = make_set(settings, root, report)
     yields = json.loads((folder / YIELD).read_text())
-    quality = _contact_rows(folder) if settings.grasp == RECORDED else _quality_rows(folder)
+    quality = [] if settings.grasp == RECORDED else _quality_rows(folder)
     print_table(str(folder), ("", *PARTS), _yield_rows(yields) + quality)
+    if settings.grasp == RECORDED:
+        _print_recordings(folder)
     demonstrations = load_part(folder, PARTS[0])
     try:
         sheet = contact_sheet(demonstrations, twins(demonstrations))
@@ -121,15 +123,27 @@ def _quality_rows(folder: Path) -> list[tuple[str, ...]]:
     ]
 
 
-def _contact_rows(folder: Path) -> list[tuple[str, ...]]:
-    measured = [check_contacts(folder, part) for part in PARTS]
-    return [
-        ("length (s)", *(_range(c.seconds) for c in measured)),
-        ("lift (cm)", *(_range(100 * c.lift) for c in measured)),
-        ("mass (g)", *(_range(1000 * c.mass) for c in measured)),
-        ("finger tips off the lifted object, mean (mm)", *(_range(1000 * c.gap) for c in measured)),
-        ("hand in the object, at most (mm)", *(_range(1000 * c.depth) for c in measured)),
+def _print_recordings(folder: Path) -> None:
+    """A row for each recording, and a line for each that is not in the set."""
+    told = json.loads((folder / RECORDINGS).read_text())
+    rows = [
+        (
+            row["name"],
+            f"{row['side']}, {row['object']}",
+            f"{row['first']} to {row['last']} of {row['frames']}",
+            f"{1e3 * row['gap']:.1f}",
+            f"{1e3 * row['depth']:.1f}",
+            f"{1e3 * row['hand_moved']:.1f}",
+            f"{row['carried']:.0%}",
+            row["part"],
+        )
+        for row in told["recordings"]
     ]
+    columns = ("recording", "hand", "frames", "tip gap (mm)", "in it (mm)", "hand moved (mm)", "carried", "part")
+    print_table("recordings", columns, rows)
+    for row in told["refused"]:
+        print(f"left out: {row['why']}")
+    print(f"pages: {folder / 'pages'}")
 
 
 def _range(values: np.ndarray) -> str:

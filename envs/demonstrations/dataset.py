@@ -3,7 +3,8 @@
 A set is a folder of `train/NNN.npz` and `heldout/NNN.npz` (schema mjx-hand/demonstration/2). Beside each stand the
 motion that was fitted to its markers, `NNN.motion.npz` (which `mjx-hand retarget` reads), and its truth,
 `NNN.truth.npz`; `yield.json` counts what came of all attempts. Training and held-out demonstrations come from different
-people, object sizes and seeds. A set made from a real recording holds variations of it, and neither motions nor truth.
+people, object sizes and seeds. A set made from real recordings holds variations of them, a page for
+each, and neither motions nor truth.
 """
 
 import dataclasses
@@ -14,18 +15,21 @@ from pathlib import Path
 
 import numpy as np
 
-from envs.demonstrations.from_recording.demonstration import RECORDED, read_demonstration
-from envs.demonstrations.from_recording.variations import vary
 from envs.demonstrations.load_set import PARTS, demonstration_files
+from envs.demonstrations.recordings.recorded_set import recorded_set
+from envs.demonstrations.recordings.recording_page import write_pages
+from envs.demonstrations.recordings.variations import divided
 from envs.demonstrations.scripted.own_object import own_object
-from envs.demonstrations.scripted.simulated_capture import project_recording, record_trials, save_truth
+from envs.demonstrations.scripted.simulated_capture import load_truth, project_recording, record_trials, save_truth
 from envs.demonstrations.scripted.trials import perform_trials
 from envs.demonstrations.set_settings import SetSettings, set_folder
 from envs.grasps import grasp_type
+from envs.grip_force import RECORDED
 from mjx_hand.files.npz_archive import replacing
 from mjx_hand.files.working_folder import remove_abandoned, working_folder
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion.demonstration import load_demonstration, save_demonstration
+from mjx_hand.motion.mirror import mirrored_demonstration, mirrored_motion, mirrored_pose
 from mjx_hand.motion.motion import load_motion_file, save_motion
 from mjx_hand.progress import shares
 from mjx_hand.pytree import replace
@@ -67,6 +71,9 @@ def make_set(settings: SetSettings, root: str | Path, report: Report = lambda wh
     with working_folder(folder) as temporary:
         if settings.grasp == RECORDED:
             yields = _make_variations(settings, temporary, report)
+        elif settings.side == "left":
+            right = dataclasses.replace(settings, side="right")
+            yields = _mirror(make_set(right, root, report), temporary)
         elif (usual := dataclasses.replace(settings, capture=settings.capture.projected_as_usual())) != settings:
             yields = _project_again(settings, make_set(usual, root, report), temporary, report)
         else:
@@ -141,16 +148,40 @@ def _project_again(settings: SetSettings, usual: Path, folder: Path, report: Rep
     return json.loads((usual / YIELD).read_text())
 
 
+def _mirror(right: Path, folder: Path) -> Mapping[str, Mapping[str, int]]:
+    """Make both parts as mirror images of a set's, with their motions and truths; what came of that set's attempts."""
+    for path in (path for part in PARTS for path in demonstration_files(right, part)):
+        there = folder / path.parent.name
+        there.mkdir(exist_ok=True)
+        save_demonstration(mirrored_demonstration(load_demonstration(path)), there / path.name)
+        save_motion(
+            mirrored_motion(load_motion_file(path.with_suffix(".motion.npz"))), there / f"{path.stem}.motion.npz"
+        )
+        truth = load_truth(path.with_suffix(".truth.npz"))
+        wrist = mirrored_pose(np.concatenate([truth.wrist_position, truth.wrist_quaternion], axis=1))
+        mirrored = dataclasses.replace(
+            truth,
+            wrist_position=wrist[:, :3],
+            wrist_quaternion=wrist[:, 3:],
+            object_pose=mirrored_pose(truth.object_pose),
+        )
+        save_truth(mirrored, there / f"{path.stem}.truth.npz")
+    return json.loads((right / YIELD).read_text())
+
+
 def _make_variations(settings: SetSettings, folder: Path, report: Report) -> Mapping[str, Mapping[str, int]]:
-    """Make both parts from a recording; what they hold."""
-    given, made = settings.recording, 0
-    recorded = read_demonstration(given, report)
-    for offset, (part, count) in enumerate(zip(PARTS, (given.train, given.heldout), strict=True)):
+    """Make both parts from recordings, and a page for each of these; what the parts hold."""
+    given = settings.recording
+    recorded = recorded_set(given, report)
+    yields = {}
+    for offset, part in enumerate(PARTS):
         rng = np.random.default_rng(settings.seed + offset * _APART)
         (folder / part).mkdir()
-        for k in range(count):
-            demonstration = recorded if (part, k) == (PARTS[1], 0) else vary(recorded, given, rng)
+        made = divided(recorded.demonstrations, given, part == PARTS[1], rng)
+        for k, demonstration in enumerate(made):
             save_demonstration(demonstration, folder / part / f"{k:03d}.npz")
-            made += 1
-            report("varying the recording", made / (given.train + given.heldout))
-    return {PARTS[0]: {VARIED: given.train}, PARTS[1]: {AS_RECORDED: 1, VARIED: given.heldout - 1}}
+            report("varying the recordings", k / len(made))
+        plain = sum(any(d is one for one in recorded.demonstrations) for d in made)
+        yields[part] = {AS_RECORDED: plain, VARIED: len(made) - plain}
+    write_pages(recorded, given, folder)
+    return yields

@@ -6,18 +6,18 @@ import json
 from pathlib import Path
 from typing import Any
 
-from envs.demonstrations.from_recording.demonstration import RECORDED
-from envs.demonstrations.from_recording.variations import RecordingSettings
+from envs.demonstrations.recordings.recording_files import recording_digest
+from envs.demonstrations.recordings.recording_settings import RecordingSettings
 from envs.demonstrations.scripted.simulated_capture import CaptureSettings
 from envs.grasps import grasp_names, grasp_type
-from mjx_hand.capture.object_poses.dexmv_object import recording_files
+from envs.grip_force import RECORDED
 from mjx_hand.errors import InputError
 from mjx_hand.objects.mesh_file import mesh_digest
 
 ALL = "all"
 GIVEN = "given"
 _VERSION = 3  # of the generator: a change that makes other demonstrations of the same settings raises it
-_RECORDED_VERSION = 4  # the same of what is made of a recording
+_RECORDED_VERSION = 5  # the same of what is made of a recording
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,6 +33,8 @@ class SetSettings:
         seed: of every draw; the held-out part uses the next one.
         capture: how they are recorded.
         recording: the real recording, and how it is varied; of the other settings it uses the seed.
+        side: of the hand that scripted grasps are of; a left one's are mirror images of the right one's. A recording
+            has its own.
         folder: of finished demonstrations, as `load_set.load_part` reads it.
         object: a mesh file (m), which scripted grasps grasp in place of the type's objects; its axes are the type's.
         object_mass, object_density: of it, kg or kg/m³; without either the type's range of masses is drawn from.
@@ -45,6 +47,7 @@ class SetSettings:
     seed: int = 0
     capture: CaptureSettings = dataclasses.field(default_factory=CaptureSettings)
     recording: RecordingSettings = dataclasses.field(default_factory=RecordingSettings)
+    side: str = "right"
     folder: str = ""
     object: str = ""
     object_mass: float | None = None
@@ -53,6 +56,13 @@ class SetSettings:
     def __post_init__(self):
         if self.grasp not in (ALL, RECORDED, GIVEN):
             grasp_type(self.grasp)
+        if self.side not in ("right", "left"):
+            raise InputError(f"data.side is {self.side!r}; valid: right, left")
+        if self.side != "right" and self.grasp in (RECORDED, GIVEN):
+            raise InputError(
+                f"data.side is {self.side!r} and data.grasp {self.grasp!r}; it is of scripted grasps, "
+                "a recording's hand is chosen by data.recording.side"
+            )
         if (self.grasp == GIVEN) != bool(self.folder):
             raise InputError(
                 f"data.grasp is {self.grasp!r} and data.folder {self.folder!r}; give data.folder=PATH alone for "
@@ -95,15 +105,10 @@ def set_folder(settings: SetSettings, root: str | Path) -> Path:
         InputError: several or finished sets, which have no such folder, or a recording that is not there.
     """
     ingredients: list[Any] = [_VERSION, fingerprint(settings)]
-    recording = ingredients[1].pop("recording")
+    recording = ingredients[1].pop("recording", None)
     if settings.grasp == RECORDED:
-        files = _recording_files(settings.recording)
-        ingredients = [
-            _RECORDED_VERSION,
-            settings.seed,
-            recording,
-            *(hashlib.sha256(f.read_bytes()).hexdigest() for f in files),
-        ]
+        del recording["path"]  # what it holds tells, not where it is
+        ingredients = [_RECORDED_VERSION, settings.seed, recording, recording_digest(settings.recording.path)]
     else:
         grasp = dataclasses.asdict(grasp_type(settings.grasp))
         del grasp["grip_force"]  # it is the twin's: the same demonstrations are made whatever it is
@@ -116,16 +121,13 @@ def fingerprint(settings: SetSettings) -> dict[str, Any]:
     """All settings that tell sets apart, as in `CaptureSettings.fingerprint`."""
     told = dataclasses.asdict(settings) | {"capture": settings.capture.fingerprint()}
     del told["folder"]  # what it holds tells, not where it is: `load_set.part_digest`
+    if settings.grasp != RECORDED:
+        del told["recording"]
+    if settings.side == "right":  # sets from before there were left ones keep their names
+        del told["side"]
     if settings.object:
         told["object"] = mesh_digest(settings.object)
     else:  # sets from before there were own objects keep their names
         for name in ("object", "object_mass", "object_density"):
             del told[name]
     return told
-
-
-def _recording_files(settings: RecordingSettings) -> tuple[Path, ...]:
-    try:
-        return recording_files(settings.path)
-    except InputError as error:
-        raise InputError(f"{error}: data.recording.path=FOLDER") from None

@@ -25,11 +25,14 @@ class Evaluation:
             ends their name. `hold` is there only where the rollouts went on after the demonstration, and where any
             demonstration ends with its object raised; `kept` is `chord`, and `hold` where it is there.
         failure: why each rollout failed `manip_trans_object` (a word of `failure.FAILURES`), "" where it did not.
+        lost: the first counted frame in which each rollout's object was 3 cm or 30° from its way, -1 where it never
+            was; empty where it was not looked for.
     """
 
     demonstration: Int[np.ndarray, "n"]
     scores: Mapping[str, Shaped[np.ndarray, "n"]]
     failure: tuple[str, ...]
+    lost: tuple[int, ...] = ()
 
     def rows(self, where: Bool[np.ndarray, "n"] | None = None) -> dict[str, float]:
         """Metric name to its mean over all rollouts, or over those of `where`.
@@ -83,7 +86,12 @@ def evaluate(
         "joint_error_cm": 100 * metrics.over_counted(metrics.joint_error(rollouts), rollouts),
         "tip_error_cm": 100 * metrics.over_counted(metrics.tip_error(rollouts), rollouts),
     }
-    return Evaluation(demonstration=rollouts.demonstration, scores=scores, failure=failure_reasons(rollouts, success))
+    return Evaluation(
+        demonstration=rollouts.demonstration,
+        scores=scores,
+        failure=failure_reasons(rollouts, success),
+        lost=metrics.lost(rollouts),
+    )
 
 
 def _is_human(rollouts: Rollouts) -> bool:

@@ -84,6 +84,14 @@ def tracking_error(rollouts: Rollouts) -> Float[np.ndarray, "n"]:
     return 100 * over_counted(position_error(rollouts), rollouts)
 
 
+def lost(rollouts: Rollouts) -> tuple[int, ...]:
+    """The first counted frame, from the first one on, in which the object is 3 cm or 30° from its way; -1 for none."""
+    off = position_error(rollouts) >= MANIP_TRANS["translation"]
+    off = rollouts.counted & (off | (rotation_error(rollouts) >= MANIP_TRANS["rotation"]))
+    first = np.argmax(off, axis=1) - np.argmax(rollouts.counted, axis=1)
+    return tuple(np.where(off.any(axis=1), first, -1).tolist())
+
+
 def manip_trans_object(rollouts: Rollouts) -> Bool[np.ndarray, "n"]:
     """ManipTrans, the object's part: mean rotation error < 30 degrees and mean translation error < 3 cm."""
     turned = over_counted(rotation_error(rollouts), rollouts) < MANIP_TRANS["rotation"]

@@ -46,8 +46,7 @@ def load_motion(
             asked for, or no hand moves so (`mjx_hand.motion.plausibility`).
     """
     path = Path(path)
-    if side not in (None, "right", "left"):
-        raise InputError(f"side is {side!r}; give 'right' or 'left'")
+    request = requested(side, sequence, mano, fps)
     if markers is not None:
         if sequence is not None or fps is not None:
             raise InputError(
@@ -55,17 +54,43 @@ def load_motion(
                 "says none: load_markers(path, fps=), fit_markers)"
             )
         return _fitted(path, markers, load_hand(mano, side or "right"))
-    request = Request(
+    return motion_in(path, contents_of(path), request)
+
+
+def requested(side: str | None, sequence: str | None, mano: str | Path | None, fps: float | int | None) -> Request:
+    """What a caller says of a recording.
+
+    Raises:
+        InputError: a side that there is not.
+    """
+    if side not in (None, "right", "left"):
+        raise InputError(f"side is {side!r}; give 'right' or 'left'")
+    return Request(
         side=side,
         sequence=sequence,
         mano=Path(mano) if mano is not None else None,
         fps=float(fps) if fps is not None else None,
     )
+
+
+def contents_of(path: Path) -> Contents:
+    """What a recording's file holds, read once for whoever asks what it is.
+
+    Raises:
+        InputError: there is no such file, or it is damaged.
+    """
     if not path.is_dir():
         check_input_file(path, "give the path of a recording")
-    contents = read_contents(path)
-    formats = dataset_formats()
-    for known in formats:
+    return read_contents(path)
+
+
+def motion_in(path: Path, contents: Contents, request: Request) -> Motion:
+    """The motion in a recording whose contents are read.
+
+    Raises:
+        InputError: as `load_motion`.
+    """
+    for known in dataset_formats():
         if known.recognises(path, contents):
             motion = _asked_for(path, known, request, known.read(path, contents, request))
             return plausible_motion(motion, name=str(path))

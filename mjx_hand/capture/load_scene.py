@@ -2,11 +2,9 @@
 
 from pathlib import Path
 
-from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request, dataset_formats
-from mjx_hand.capture.load import load_motion
+from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, dataset_formats
+from mjx_hand.capture.load import contents_of, load_motion, motion_in, requested
 from mjx_hand.errors import InputError
-from mjx_hand.files.contents import read_contents
-from mjx_hand.files.input_file import check_input_file
 from mjx_hand.motion import RecordedScene, make_scene
 from mjx_hand.motion.plausibility.motions import plausible_motion
 from mjx_hand.pytree import replace
@@ -34,21 +32,16 @@ def load_scene(
     Raises:
         InputError: as `load_motion`, or the objects cannot be read.
     """
-    path = Path(path)
-    known, contents = None, {}
-    if markers is None:
-        if not path.is_dir():
-            check_input_file(path, "give the path of a recording")
-        contents = read_contents(path)
-        known = scene_format(path, contents)
-    if known is None or known.read_scene is None:
+    path, request = Path(path), requested(side, sequence, mano, fps)
+    if markers is not None:
         return make_scene(load_motion(path, side=side, sequence=sequence, mano=mano, fps=fps, markers=markers))
-    if side not in (None, "right", "left"):
-        raise InputError(f"side is {side!r}; give 'right' or 'left'")
+    contents = contents_of(path)
+    known = scene_format(path, contents)
+    if known is None or known.read_scene is None:
+        return make_scene(motion_in(path, contents, request))
     if sequence is not None and not known.has_sequences:
         raise InputError(f"{path}: holds one recording; leave out sequence={sequence!r}")
-    folder = None if mano is None else Path(mano)
-    scene = known.read_scene(path, contents, Request(side, sequence, folder, None if fps is None else float(fps)))
+    scene = known.read_scene(path, contents, request)
     if fps is not None and fps != scene.fps:
         raise InputError(f"{path}: was recorded at {scene.fps:g} frames per second; leave out fps={fps:g}")
     return replace(scene, hands=tuple(plausible_motion(hand, name=str(path)) for hand in scene.hands))

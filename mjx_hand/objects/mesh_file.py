@@ -64,19 +64,28 @@ def read_object_mesh(path: str | Path, unit: str = "m") -> tuple[Float[np.ndarra
         raise InputError(f"{path}: unit {unit!r} is not known; valid: {', '.join(UNITS)}")
     vertices, faces = read_mesh(path)
     vertices = vertices * UNITS[unit]
+    check_object_size(str(path), vertices, faces)
+    return vertices, faces
+
+
+def check_object_size(name: str, vertices: Float[np.ndarray, "v 3"], faces: Int[np.ndarray, "f 3"]) -> None:
+    """Check that a mesh (m) is of something that a hand holds.
+
+    Raises:
+        InputError: it is too long or too short for that, or has far too many triangles.
+    """
     longest = float(np.ptp(vertices, axis=0).max())
     if not _EXTENT[0] <= longest <= _EXTENT[1]:
         guess = longest / 1000
         hint = " (in millimetres? scale it by 0.001)" if _EXTENT[0] <= guess <= _EXTENT[1] else ""
         raise InputError(
-            f"{path}: {longest:.4g} m long, but an object in a hand is {_EXTENT[0]:g} to {_EXTENT[1]:g} m{hint}"
+            f"{name}: {longest:.4g} m long, but an object in a hand is {_EXTENT[0]:g} to {_EXTENT[1]:g} m{hint}"
         )
     if len(faces) > _MOST_FACES:
         raise InputError(
-            f"{path}: {len(faces):,} triangles; at most {_MOST_FACES:,} are taken: simplify the mesh first "
+            f"{name}: {len(faces):,} triangles; at most {_MOST_FACES:,} are taken: simplify the mesh first "
             "(trimesh's simplify_quadric_decimation, MeshLab, Blender's Decimate)"
         )
-    return vertices, faces
 
 
 def object_from_mesh(

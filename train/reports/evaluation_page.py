@@ -20,7 +20,7 @@ from train.reports.overlap_table import overlap_table
 from train.reports.published import PAPER
 from train.reports.score_table import demonstration_table, failed_table, failure_table, score_table
 from train.reports.stress_table import stress_figure, stress_table
-from train.reports.type_table import type_table
+from train.reports.type_table import groups, type_table
 from train.settings.config import Config
 from train.view.video import film
 
@@ -170,7 +170,7 @@ def evaluation_page(
 
 
 def _grasps(result: Results) -> list[str]:
-    return [demonstration.grasp for demonstration in result.env.demonstrations]
+    return groups(result.env.demonstrations)
 
 
 def _between(values: Sequence[float], unit: str, digits: int) -> str:

@@ -19,7 +19,7 @@ from mjx_hand.files.npz_archive import replacing
 from train.experiment.evaluate_seeds import POLICY, Results, shared_folder
 from train.reports.interval import intervals
 from train.reports.overlap_table import overlap_scores
-from train.reports.type_table import type_scores
+from train.reports.type_table import groups, type_scores
 from train.settings.config import Config
 
 SCHEMA = "mjx-hand/evaluation/3"  # 2: with the constant press; 3: with intervals and overlaps
@@ -36,7 +36,7 @@ def write_results(results: Mapping[int, Results], configs: Sequence[Config], fil
     out, config, first = shared_folder(configs), configs[0], next(iter(results.values()))
     policies = {seed: result.evaluations[POLICY] for seed, result in results.items()}
     baselines = {title: e for title, e in first.evaluations.items() if title != POLICY}
-    grasps = [demonstration.grasp for demonstration in first.env.demonstrations]
+    grasps = groups(first.env.demonstrations)
     by_type = [type_scores(e, grasps) for e in policies.values()]
     summary = {
         "schema": SCHEMA,

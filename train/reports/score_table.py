@@ -99,12 +99,16 @@ def failed_table(policies: Mapping[int, Evaluation]) -> Table:
         (
             f"demonstration {demonstration}",
             f"seed {seed}",
-            reason,
+            reason + _from_frame(policies[seed], k),
             *(score_text(n, policies[seed].scores[n][k]) for n in ("tracking_error_cm", "object_rotation_error_deg")),
         )
         for demonstration, seed, reason, k in failed
     ]
     return Table(("", "policy", "reason", "tracking error", "rotation error"), rows, _REASONS)
+
+
+def _from_frame(evaluation: Evaluation, k: int) -> str:
+    return f", from frame {evaluation.lost[k]}" if evaluation.lost and evaluation.lost[k] >= 0 else ""
 
 
 def object_text(obj: ObjectDescription) -> str:

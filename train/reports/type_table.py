@@ -1,15 +1,22 @@
-"""Evaluations on demonstrations of several grasp types, as a table for reports: a row a type, a column a policy."""
+"""Evaluations on demonstrations of several grasp types or recordings, as a table: a row a type, a column a policy."""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from envs.evaluation.evaluate import Evaluation
+from envs.grip_force import RECORDED
 from mjx_hand.errors import InputError
+from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.view.report import Table
 from train.reports.published import PAPER
 
 _SHOWN = ("manip_trans_object", "tracking_error_cm")
+
+
+def groups(demonstrations: Sequence[Demonstration]) -> list[str]:
+    """What each demonstration's scores are shown with: its grasp type, or the recording that it is of."""
+    return [d.source if d.grasp == RECORDED else d.grasp for d in demonstrations]
 
 
 def type_scores(evaluation: Evaluation, grasps: Sequence[str]) -> dict[str, dict[str, float]]:

@@ -14,6 +14,7 @@ from typing import Any
 from omegaconf import OmegaConf
 
 from envs.demonstrations.load_set import part_digest
+from envs.grip_force import RECORDED
 from envs.settings import from_dict
 from mjx_hand.errors import InputError
 from mjx_hand.files.safe_yaml import read_yaml
@@ -41,6 +42,7 @@ _FREE = (
 )
 _PLACES = ("demonstrations", "data.folder")  # taken from the run all the same where nothing else is given
 _POLICY = ("name", "data", "hand", "task", "ppo.policy_layers")  # what a policy cannot do without
+_RECORDING = ("data.recording",)  # of no account where the demonstrations are of no recording
 _FREE_OF_POLICY = ("engine",)  # any engine may play it
 
 Settings = Mapping[str, Any]
@@ -48,18 +50,22 @@ Settings = Mapping[str, Any]
 
 def settings_of(config: Config) -> Settings:
     """What must be the same for a training to go on, and what the finished demonstrations hold, wherever they are."""
-    return {option: value for option, value in _told(config).items() if not _is(option, _FREE)}
+    return {option: value for option, value in _relevant(_told(config)).items() if not _is(option, _FREE)}
 
 
 def policy_settings(config: Config) -> Settings:
     """What must be the same for a policy to be scored."""
-    return {option: value for option, value in _told(config).items() if _is(option, _POLICY) and not _is(option, _FREE)}
+    told = _relevant(_told(config))
+    return {option: value for option, value in told.items() if _is(option, _POLICY) and not _is(option, _FREE)}
 
 
 def differing(before: Settings, now: Settings) -> list[str]:
     """The options that differ. One that there was not yet when `before` was written had what is now its default."""
     usual = {option: value for option, value in settings_of(Config()).items() if option in now}
-    known = usual | {option: value for option, value in _renamed(before).items() if not _is(option, _FREE)}
+    was = _renamed(before)
+    if not any(_is(option, _RECORDING) for option in now):
+        was = {option: value for option, value in was.items() if not _is(option, _RECORDING)}
+    known = usual | {option: value for option, value in was.items() if not _is(option, _FREE)}
     return [option for option in sorted(known.keys() | now.keys()) if known.get(option) != now.get(option)]
 
 
@@ -152,6 +158,13 @@ def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 def _renamed(settings: Settings) -> Settings:
     return {RENAMED.get(option, option): value for option, value in settings.items()}
+
+
+def _relevant(settings: Settings) -> Settings:
+    """Without what is said of recordings where the demonstrations are of none."""
+    if settings.get("data.grasp") == RECORDED:
+        return settings
+    return {option: value for option, value in settings.items() if not _is(option, _RECORDING)}
 
 
 def _is(option: str, names: Collection[str]) -> bool:

@@ -63,7 +63,9 @@ def chosen(first: Bool[np.ndarray, "n"], one: GraspPose, other: GraspPose) -> Gr
     return GraspPose(*(np.where(first.reshape(-1, *[1] * (a.ndim - 1)), a, b) for a, b in pairs))
 
 
-def solve_grasp_poses(recorded: GraspPose, hand: RigidHand, planes: Float[np.ndarray, "h f 4"]) -> GraspPose:
+def solve_grasp_poses(
+    recorded: GraspPose, hand: RigidHand, planes: Float[np.ndarray, "h f 4"], *, spun: bool = True
+) -> GraspPose:
     """n grasps near a recorded one in which the last phalanges touch and no link is inside the object, nearest first.
 
     An object that looks much the same from all sides can lie in the hand in several ways: one for each way to turn it
@@ -73,12 +75,13 @@ def solve_grasp_poses(recorded: GraspPose, hand: RigidHand, planes: Float[np.nda
         recorded: as captured.
         hand: the twin's; its capsules stand for its skin.
         planes: of the object's convex pieces (`mjx_hand.objects.primitives.hull_planes`).
+        spun: whether it may have been turned about its z axis by any angle, which was not seen; else it was seen.
     """
     bare = on_device(hand)
     residual = jax.jit(partial(_residual, hand=bare, recorded=_rows(recorded), planes=planes))
     slope = jax.jit(jax.jacfwd(residual))
     found = []
-    for spin, way in itertools.product(_SPINS, _INWARDS):
+    for spin, way in itertools.product(_SPINS if spun else (0.0,), _INWARDS):
         found.append(
             least_squares(
                 lambda x: np.asarray(residual(x), float),
@@ -118,7 +121,7 @@ def capsule_gaps(
     planes: Float[Array | np.ndarray, "h f 4"],
 ) -> Float[Array, "c"]:
     """Distance (m) of each of the hand's capsules from an object in its wrist's frame; negative inside."""
-    distance = signed_distance("mesh", jnp.zeros(3), _axes(angles, rotation, position, hand), planes)
+    distance = signed_distance("mesh", jnp.zeros(3), capsule_axes(angles, rotation, position, hand), planes)
     return distance.min(axis=1) - jnp.asarray(hand.capsule_radius)
 
 
@@ -133,7 +136,7 @@ def spin_of(turn: Float[np.ndarray, "3 3"]) -> float:
     return float(2 * np.arctan2(z, w))
 
 
-def _axes(
+def capsule_axes(
     angles: Array | np.ndarray, rotation: Array | np.ndarray, position: Array | np.ndarray, hand: RigidHand
 ) -> Float[Array, "c n 3"]:
     """Points on the capsules' axes in the object's frame (m)."""
@@ -153,7 +156,7 @@ def _residual(x: Array, hand: RigidHand, recorded: tuple, planes: Array | np.nda
     angles, rotation, position = _placed(x, recorded)
     gaps = capsule_gaps(angles, rotation, position, hand, planes)
     tips = jnp.array(last_phalanges(hand))
-    places = _axes(angles, rotation, position, hand)[tips].mean(axis=1)[:, :2]  # about the object's axis
+    places = capsule_axes(angles, rotation, position, hand)[tips].mean(axis=1)[:, :2]  # about the object's axis
     thumb = FINGERS.index("thumb")
     opposite = _unit(places[thumb]) + _unit(jnp.delete(places, thumb, axis=0).mean(axis=0))
     outside = jnp.maximum(angles - hand.hinge_upper, 0) + jnp.maximum(hand.hinge_lower - angles, 0)

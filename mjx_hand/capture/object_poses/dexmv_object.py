@@ -21,29 +21,6 @@ _LAYOUT: dict[str, tuple[int | str, ...]] = {"object_pose_objcam": ("t", 3, 4), 
 _FEW_DIGITS = 0.05
 
 
-def recording_files(folder: str | Path) -> tuple[Path, ...]:
-    """The `.npz` and the `.stl` of a recording's folder; of a scene's file, that file.
-
-    Raises:
-        InputError: there is no such folder, or it does not hold one of each.
-    """
-    folder = Path(folder)
-    if folder.is_file():
-        return (folder,)
-    if not folder.is_dir():
-        raise InputError(
-            f"{folder}: no such folder; give the folder of a DexMV recording, with its .npz and a mesh, .stl, or a "
-            "scene's file"
-        )
-    found = []
-    for ending in ("npz", "stl"):
-        files = sorted(folder.glob(f"*.{ending}"))
-        if len(files) != 1:
-            raise InputError(f"{folder}: holds {len(files)} .{ending} files; a recording has one .npz and one .stl")
-        found.append(files[0])
-    return tuple(found)
-
-
 def dexmv_objects(path: Path, arrays: Mapping[str, Any], frames: int) -> tuple[RecordedObject, ...]:
     """The object in the hand's frames, named as its mesh; none where the recording has no object.
 

@@ -189,3 +189,10 @@ def test_an_object_that_was_never_lifted_is_not_held():
 def test_hold_needs_five_seconds():
     with pytest.raises(InputError, match=r"4\.98 s.*needs 5 s"):
         metrics.hold(lift(held=249))
+
+
+def test_the_frame_in_which_an_object_is_lost_is_the_first_that_is_off():
+    assert metrics.lost(lift()) == (-1,) * len(lift().counted)
+    first = int(np.argmax(lift().counted[0]))
+    assert metrics.lost(moved(lift(), by=spike(0.0301)))[0] == 17 - first
+    assert metrics.lost(moved(lift(), by=spike(0.0299)))[0] == -1

@@ -23,7 +23,7 @@ def refusal(*overrides: str) -> str:
 
 @pytest.mark.parametrize("name", EXPERIMENTS)
 def test_every_experiment_composes(name):
-    recording = ["data.recording.path=recording"] if name == "mustard" else []
+    recording = ["data.recording.path=recording"] if name in ("mustard", "recording") else []
     config = compose([f"config={name}", *recording])
     assert config.name == name
     assert config.out == f"outputs/{name}/seed0"

@@ -1,76 +1,56 @@
 """Variations of one recorded demonstration: what another capture of the same act by the same person might have been."""
 
-import dataclasses
-import math
+from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
+from envs.demonstrations.recordings.recording_settings import VARIATION, RecordingSettings
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.motion.resample import interpolation_index, matrix_quaternions, quaternion_matrices, slerp
-from mjx_hand.motion.smooth import CUTOFF, smooth_rows
+from mjx_hand.motion.smooth import smooth_rows
 from mjx_hand.pytree import replace
 
+_MASSES = 1.25  # the object's mass divided and multiplied by this, where no range is given
+_ONE_OF = 4  # recordings is held out, where whole ones are
 _DRIFT = 0.5  # Hz: errors of capture that a filter leaves are slow
 
 
-@dataclasses.dataclass(frozen=True)
-class RecordingSettings:
-    """A real recording in the place of simulated capture, and how to vary it.
+def divided(
+    demonstrations: Sequence[Demonstration], settings: RecordingSettings, heldout: bool, rng: np.random.Generator
+) -> list[Demonstration]:
+    """The demonstrations of one part, of all recordings in turn; the first held-out one of each is not varied.
 
-    Attributes:
-        path: folder of a DexMV recording: its `.npz` and the object's mesh, `.stl`; empty for simulated capture.
-        train, heldout: demonstrations in each part. The first held-out one is the recording itself, not varied.
-        mass, friction: of the object as it was recorded (kg).
-        masses, frictions: between which variations draw them.
-        force: with which the hand must be able to carry the object as it was recorded (N).
-        speeds: between which the pace is drawn, as a multiple of the recorded one.
-        wrist_error: standard deviation of the wrist's slow error, m; of its orientation, ten times as many rad.
-        angle_error: of the hinges' slow error, rad.
-        start_error: of where the wrist starts, m; gone when the hand is at the object.
-        pieces: convex pieces at most that the object's mesh becomes.
-        rate: of the demonstrations, 1/s.
-        cutoff: of the low-pass filter on the recorded angles and poses, Hz.
+    Raises:
+        InputError: recordings are to be held out, and there is one alone.
     """
+    chosen = [
+        d
+        for d, apart in zip(demonstrations, held_out(len(demonstrations), settings), strict=True)
+        if apart is None or apart == heldout
+    ]
+    wanted = settings.heldout if heldout else settings.train
+    count = max(wanted, len(chosen))
+    return [
+        chosen[k] if heldout and k < len(chosen) else vary(chosen[k % len(chosen)], settings, rng) for k in range(count)
+    ]
 
-    path: str = ""
-    train: int = 64
-    heldout: int = 32
-    mass: float = 0.6
-    friction: float = 0.8
-    masses: tuple[float, float] = (0.3, 0.65)
-    frictions: tuple[float, float] = (0.7, 1.0)
-    force: float = 32.0
-    speeds: tuple[float, float] = (0.9, 1.1)
-    wrist_error: float = 0.001
-    angle_error: float = 0.02
-    start_error: float = 0.01
-    pieces: int = 3
-    rate: float = 50.0
-    cutoff: float = CUTOFF
 
-    def __post_init__(self):
-        for name in ("train", "heldout", "pieces"):
-            if getattr(self, name) < 1:
-                raise InputError(f"data.recording.{name} is {getattr(self, name)}; it must be at least 1")
-        for name in ("mass", "friction", "force", "rate", "cutoff"):
-            if not 0 < getattr(self, name) < math.inf:
-                raise InputError(f"data.recording.{name} is {getattr(self, name)}; it must be a positive number")
-        for name in ("masses", "frictions", "speeds"):
-            limits = getattr(self, name)
-            if len(limits) != 2 or not 0 < limits[0] <= limits[1] < math.inf:
-                raise InputError(
-                    f"data.recording.{name} is {list(limits)}; give the lowest and the highest, both above 0"
-                )
-        for name in ("wrist_error", "angle_error", "start_error"):
-            if not 0 <= getattr(self, name) < math.inf:
-                raise InputError(f"data.recording.{name} is {getattr(self, name)}; it must be a number of 0 or more")
-        if self.cutoff >= self.rate / 2:
-            raise InputError(
-                f"data.recording.cutoff is {self.cutoff} Hz; it must be below half of data.recording.rate ({self.rate})"
-            )
+def held_out(count: int, settings: RecordingSettings) -> list[bool | None]:
+    """Whether each of `count` recordings is held out: None where its variations are in both parts.
+
+    Raises:
+        InputError: recordings are to be held out, and there is one alone.
+    """
+    if settings.hold_out == VARIATION:
+        return [None] * count
+    if count < 2:
+        raise InputError(
+            f"{settings.path}: one recording cannot be held out and trained on; give data.recording.hold_out=variation"
+        )
+    return [k % _ONE_OF == min(_ONE_OF, count) - 1 for k in range(count)]
 
 
 def vary(demonstration: Demonstration, settings: RecordingSettings, rng: np.random.Generator) -> Demonstration:
@@ -88,9 +68,8 @@ def vary(demonstration: Demonstration, settings: RecordingSettings, rng: np.rand
         wrist_position=_turned_about(d, turned) + moved,
         wrist_quaternion=matrix_quaternions(wrist.as_matrix()),
     )
-    varied = replace(
-        d.object, mass=float(rng.uniform(*settings.masses)), friction=float(rng.uniform(*settings.frictions))
-    )
+    low, high = settings.masses or (d.object.mass / _MASSES, d.object.mass * _MASSES)
+    varied = replace(d.object, mass=float(rng.uniform(low, high)), friction=float(rng.uniform(*settings.frictions)))
     return replace(d, motion=motion, object=varied)
 
 

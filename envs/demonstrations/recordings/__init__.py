@@ -1,0 +1,1 @@
+"""From anyone's recording, with its objects, to demonstrations: no step knows the object."""
