@@ -19,9 +19,14 @@ class Timing:
     def __init__(self) -> None:
         self.stages = {name: Histogram() for name in STAGES}
         self.counts: dict[str, int | float] = dict.fromkeys(COUNTS, 0)
-        self._began = time.monotonic()
+        self._began = 0.0
+        self.begin()
         self._notices: dict[str, int] = {}
         self.notice = ""  # the last
+
+    def begin(self) -> None:
+        """Count seconds from now on."""
+        self._began = time.monotonic()
 
     def add(self, stage: str, seconds: float) -> None:
         """A stage took that long."""

@@ -25,7 +25,8 @@ class Datagrams:
     """
 
     def __init__(self, host: str, port: int, up: str = "+y", forward: str = "-z"):
-        self.up, self.forward = up, forward
+        self.up: str | None = up
+        self.forward = forward
         if not 0 <= port <= 65535:
             raise InputError(f"cannot listen at {host}:{port}: ports are 0 to 65535; choose another --udp-port")
         self._socket = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_DGRAM)

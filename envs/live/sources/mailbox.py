@@ -12,7 +12,8 @@ class Mailbox:
     """What the service's `/hand` is told; see `Source`."""
 
     def __init__(self, name: str, up: str = "+y", forward: str = "-z"):
-        self.name, self.up, self.forward = name, up, forward
+        self.name, self.forward = name, forward
+        self.up: str | None = up
         self._put: Put | None = None
 
     def run(self, put: Put, stop: threading.Event, timing: Timing) -> None:

@@ -2,7 +2,7 @@
 
 import threading
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from envs.live.flow.arrival import Arrival
 from envs.live.flow.timing import Timing
@@ -10,6 +10,7 @@ from envs.live.flow.timing import Timing
 Put = Callable[[Arrival], None]
 
 
+@runtime_checkable
 class Source(Protocol):
     """A source of frames of one hand.
 

@@ -5,23 +5,19 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
+from envs.live.twin.hand_solver import HandSolver
 from envs.live.twin.person import FRAMES, KnownHand, Person, measured_hand
 from envs.live.twin.placement import AS_IT_IS, place_hand
 from envs.live.twin.pose import HandPose
 from mjx_hand.capture.keypoints.skeleton import rest_keypoints
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
-from mjx_hand.robots.human_motion import human_objective
-from mjx_hand.robots.human_tree import human_tree
-from mjx_hand.robots.solver.keypoint_stream import KeypointStream
-
-_SETTLED = 5  # frames followed before it is said where the hand stands: the first may be a poor one
 
 
 class Tracker:
     """Measures the person's hand, then follows it.
 
-    All that compiles does so as it is made; a person's hand runs what the mean hand's compiled.
+    What building a hand compiles does so as it is made: nothing compiles while it follows.
 
     Args:
         side: "right" or "left".
@@ -44,23 +40,16 @@ class Tracker:
         say: Callable[[str], None],
     ):
         self._side, self._up, self._forward, self._say = side, up, forward, say
-        self._objective = human_objective()
         rest = rest_keypoints(load_hand(side=side))[0]
-        mean = measured_hand(np.tile(rest, (FRAMES, 1, 1)), side).rigid  # compiles what measuring needs
-        self._stream = KeypointStream(human_tree(mean), self._objective)
-        self._stream.warm_up()
-        self._stream.reset()
+        self._solver = HandSolver(
+            measured_hand(np.tile(rest, (FRAMES, 1, 1)), side).rigid
+        )  # compiles what measuring needs
         self._person = Person(side)
-        self._followed = 0
         self.hand: KnownHand | None = None
         self.known = 0.0
         self.placement = AS_IT_IS if up is None else None
         if hand is not None:
             self._follow(hand)
-
-    def forget_place(self) -> None:
-        """Place the hand anew when it is next seen, unless its frame is the world's."""
-        self.placement, self._followed = (AS_IT_IS if self._up is None else None), 0
 
     def pose(self, keypoints: Float[np.ndarray, "21 3"], at: float) -> HandPose | None:
         """Where the hand is in the world; None while it is not seen, or not yet known.
@@ -80,18 +69,16 @@ class Tracker:
                 self._person, self.known = Person(self._side), 0.0
                 return None
         assert self.hand is not None
-        found = self._stream.step(keypoints)
-        if not found.seen:
+        found = self._solver.solve(keypoints)
+        if found is None:
             return None
-        position, quaternion = np.asarray(found.base_position, float), np.asarray(found.base_quaternion, float)
+        position, quaternion, angles = found
         if self.placement is None:
-            self._followed += 1
-            if self._followed < _SETTLED or self._up is None:
-                return None
+            assert self._up is not None
             self.placement = place_hand(position, quaternion, self.hand.rigid, self._up, self._forward)
         place = self.placement
-        return HandPose(place.position(position), place.quaternion(quaternion), np.asarray(found.dofs, float))
+        return HandPose(place.position(position), place.quaternion(quaternion), angles)
 
     def _follow(self, hand: KnownHand) -> None:
         self.hand, self.known = hand, 1.0
-        self._stream = KeypointStream(human_tree(hand.rigid), self._objective)
+        self._solver = HandSolver(hand.rigid)
