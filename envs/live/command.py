@@ -3,6 +3,7 @@
 import contextlib
 import json
 import secrets
+import socket
 import ssl
 import sys
 import tempfile
@@ -39,6 +40,7 @@ def live(
     fps: float | None = None,
     once: bool = False,
     seconds: float | None = None,
+    assist: Literal["off", "grip"] = "off",
     camera: int = 0,
     host: str = "127.0.0.1",
     port: int = PORT,
@@ -61,6 +63,8 @@ def live(
         fps: frames a second, of a recording that does not say.
         once: end with the recording, which else begins again.
         seconds: end after that time.
+        assist: grip presses what the fingers touch, as the references of training do; off leaves fingers as they are
+            tracked.
         camera: number of the webcam.
         host: address to listen on; 0.0.0.0, or this computer's own, lets other computers and headsets in.
         port: of the page and of websockets; 0 chooses a free one.
@@ -87,7 +91,16 @@ def live(
     with (
         _security(https or (source == "webxr" and is_public(host)), host) as secure,
         serving(
-            frames, table, which, token, host=host, port=port, publish=addresses, secure=secure, folder=out
+            frames,
+            table,
+            which,
+            token,
+            host=host,
+            port=port,
+            publish=addresses,
+            secure=secure,
+            folder=out,
+            assist=assist,
         ) as session,
     ):
         _greet(source, host, session.server.port, token, secure is not None, frames)
@@ -121,7 +134,11 @@ def _address(text: str) -> tuple[str, int]:
     host, _, port = text.rpartition(":")
     if not host or not port.isdigit() or not 0 < int(port) < 65536:
         raise InputError(f"--publish {text}: give HOST:PORT, such as 127.0.0.1:9200")
-    return host.strip("[]"), int(port)
+    try:
+        found = socket.getaddrinfo(host.strip("[]"), int(port), type=socket.SOCK_DGRAM)
+    except OSError as error:
+        raise InputError(f"--publish {text}: {host!r} is not found ({error.strerror}); give an address") from None
+    return found[0][4][0], int(port)
 
 
 @contextlib.contextmanager

@@ -37,14 +37,23 @@ class Pipeline:
         folder: for recordings.
         timing: told of all that takes time.
         feed: where the twin goes.
+        assist: see `World`.
     """
 
     def __init__(
-        self, source: Source, tracker: Tracker, table: Tabletop, side: str, folder: Path, timing: Timing, feed: Feed
+        self,
+        source: Source,
+        tracker: Tracker,
+        table: Tabletop,
+        side: str,
+        folder: Path,
+        timing: Timing,
+        feed: Feed,
+        assist: str = "off",
     ):
         self._source, self._tracker, self._table, self._side = source, tracker, table, side
         self._timing = timing
-        self._simulation = Simulation(table, side, folder, timing, feed)
+        self._simulation = Simulation(table, side, folder, timing, feed, assist)
         self._messages = Messages(side)
         self._arrivals: Newest[Arrival] = Newest()
         self._targets: Newest[Target] = Newest()
@@ -115,6 +124,7 @@ class Pipeline:
             self._timing.counts["replaced"] = self._arrivals.replaced + self._targets.replaced
             if arrival is None:
                 if now - heard > _LOST and self._tracker.hand is not None:
+                    self._state = "no frames come"
                     self._targets.put(Target(None, now, now))
                 continue
             heard = now

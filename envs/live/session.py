@@ -43,6 +43,7 @@ def serving(
     publish: tuple[tuple[str, int], ...] = (),
     secure: ssl.SSLContext | None = None,
     folder: Path = Path("outputs/live"),
+    assist: str = "off",
 ) -> Iterator[Session]:
     """Compile, serve, and run, until the end of the block.
 
@@ -55,6 +56,7 @@ def serving(
         publish: addresses to which the twin's state goes by UDP.
         secure: for HTTPS.
         folder: for recordings.
+        assist: see `World`.
 
     Raises:
         InputError: the port is taken.
@@ -62,7 +64,7 @@ def serving(
     timing, feed = Timing(), Feed()
     hand = source.hand if isinstance(source, Recorded) else None
     tracker = Tracker(side, source.up, source.forward, hand, timing.say)
-    pipeline = Pipeline(source, tracker, table, side, folder, timing, feed)
+    pipeline = Pipeline(source, tracker, table, side, folder, timing, feed, assist)
     receive = source.receive if isinstance(source, Mailbox) else None
     server = Server(host, port, token, feed, pipeline, timing, receive, publish, secure)
     server.start()

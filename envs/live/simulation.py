@@ -49,13 +49,14 @@ class Simulation:
         folder: for recordings.
         timing: told of all that takes time.
         feed: where the twin goes.
+        assist: see `World`.
 
     Attributes:
         recording: whether what the twin does is recorded.
     """
 
-    def __init__(self, table: Tabletop, side: str, folder: Path, timing: Timing, feed: Feed):
-        self._table, self._side, self._folder = table, side, folder
+    def __init__(self, table: Tabletop, side: str, folder: Path, timing: Timing, feed: Feed, assist: str = "off"):
+        self._table, self._side, self._folder, self._assist = table, side, folder, assist
         self._timing, self._feed = timing, feed
         self._wishes: set[str] = set()
         self._number, self._shown = 0, 0.0
@@ -78,7 +79,8 @@ class Simulation:
                 return
         assert tracker.hand is not None
         assert tracker.placement is not None
-        world, follower = World(tracker.hand.rigid, self._table, first.pose), Follower(first.pose)
+        world = World(tracker.hand.rigid, self._table, first.pose, self._assist)
+        follower = Follower(first.pose)
         recorder = Recorder(self._table, tracker.hand.shape, self._side, 1 / (_RECORDED * world.timestep))
         self._feed.scene = scene_message(tracker.hand.rigid, self._table, tracker.placement)
         wanted, steps = first.pose, 0

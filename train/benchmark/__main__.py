@@ -11,7 +11,7 @@ import tyro
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 from mjx_hand.files.npz_archive import replacing
-from train.benchmark import convergence, engines, keypoints, mjbatch, retarget, solver
+from train.benchmark import convergence, engines, keypoints, live, mjbatch, retarget, solver
 from train.benchmark.gpu import command as gpu
 
 MODULES = {
@@ -19,11 +19,12 @@ MODULES = {
     "engines": engines,
     "gpu": gpu,
     "keypoints": keypoints,
+    "live": live,
     "mjbatch": mjbatch,
     "retarget": retarget,
     "solver": solver,
 }
-BY_NAME = ("gpu",)  # needs what few machines have
+BY_NAME = ("gpu", "live")  # need what few machines have, and a browser
 
 
 def main(argv: Sequence[str] | None = None) -> int:

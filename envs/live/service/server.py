@@ -232,9 +232,12 @@ class Server:
 
     async def _publish_to(self, address: tuple[str, int]) -> None:
         transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(_Deaf, remote_addr=address)
-        async for snapshot, text in self._states():
-            transport.sendto(text.encode())
-            self._time_sending(snapshot)
+        try:
+            async for snapshot, text in self._states():
+                transport.sendto(text.encode())
+                self._time_sending(snapshot)
+        finally:
+            transport.close()
 
     async def _states(self) -> AsyncIterator[tuple[Snapshot, str]]:
         """Each snapshot as JSON, newest wins."""

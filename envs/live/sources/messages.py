@@ -22,6 +22,7 @@ from mjx_hand.capture.keypoint_frames.frame_hand import IMAGE, FrameHand
 from mjx_hand.capture.keypoint_frames.json_hands import frame_hands
 from mjx_hand.capture.keypoints.layouts import NUM_KEYPOINTS
 from mjx_hand.capture.keypoints.names import counted_keypoints, named_keypoints
+from mjx_hand.capture.keypoints.side import bend_towards_right
 from mjx_hand.capture.keypoints.size import unit_factor
 from mjx_hand.errors import InputError
 
@@ -57,7 +58,7 @@ class Messages:
             empty = not hands and any(name in told and not told[name] for name in _PLACES)
             chosen = [hand for hand in hands if hand.form != IMAGE and hand.side in ("", self._side)]
             if chosen:
-                return _places(chosen[0], told.get("unit"))
+                return self._own([_places(hand, told.get("unit")) for hand in chosen])
         except InputError:
             raise
         except Exception as error:  # a stranger's message raises anything at all
@@ -67,6 +68,11 @@ class Messages:
         if not hands and not empty:
             raise InputError(f"message: says no hand's keypoints; it has {', '.join(map(repr, list(told)[:5]))}")
         return np.full((NUM_KEYPOINTS, 3), np.nan)
+
+    def _own(self, found: list[Float[np.ndarray, "21 3"]]) -> Float[np.ndarray, "21 3"]:
+        """Of several hands whose side nobody says, the one whose fingers bend as the side's do."""
+        sign = 1 if self._side == "right" else -1
+        return found[0] if len(found) == 1 else max(found, key=lambda hand: sign * bend_towards_right(hand[None]))
 
     def _is_late(self, stamp: Any) -> bool:
         """Whether a message was overtaken by others, by its sender's clock."""

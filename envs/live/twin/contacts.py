@@ -32,7 +32,7 @@ def touches(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> list[Touch
     found = []
     for k, contact in enumerate(data.contact[: data.ncon]):
         bodies = [int(model.geom_bodyid[geom]) for geom in contact.geom]
-        if body not in bodies or 0 in bodies:  # of others, or with the table
+        if body not in bodies or 0 in bodies or contact.efc_address < 0:  # of others, with the table, or only near
             continue
         of_second = np.zeros(6)
         mujoco.mj_contactForce(model, data, k, of_second)

@@ -17,13 +17,13 @@ from mjx_hand.rigid.export.mjcf import hand_spec
 from mjx_hand.rigid.rigid_hand import RigidHand
 
 HUBER = 0.02  # m: what is farther off counts by its distance, no longer by its square
-UNLIKE = 0.03  # m, on average, from which on keypoints are no hand's
-_HOLD = 1e-5  # m2/rad2: a hinge that no keypoint shows stays where it was
+UNLIKE = 0.02  # m, on average, from which on keypoints are no hand's
+_HOLD = 1e-7  # m2/rad2: a hinge that no keypoint shows stays where it was
 _FEWEST, _FEWEST_OF_PALM = 8, 3  # keypoints of a frame that shows a hand
 _NEXT, _FIRST = 8, 20  # steps of a frame that follows another, and of one that follows none, at most
 _BENDS = (0.1, 0.45, 0.8)  # shares of their range at which the hinges of such a frame begin
 _SMALL = 1e-4  # m, rad: a step after which no other is made
-_DAMPING, _GROWTH, _MOST = 1e-6, 10.0, 1e3
+_DAMPING, _GROWTH, _MOST = 1e-8, 10.0, 1e3
 _DOFS = 6 + NUM_HINGES
 
 

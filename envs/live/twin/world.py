@@ -5,6 +5,7 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.live.twin.contacts import Touch, touches
+from envs.live.twin.grip import Grip, notice_near
 from envs.live.twin.pose import HandPose
 from envs.live.twin.tabletop import Tabletop
 from envs.live.twin.wrist import Wrist
@@ -15,6 +16,7 @@ from mjx_hand.hand.joints import LINKS, NUM_HINGES, PARENTS
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand
 
+ASSISTS = ("off", "grip")
 _HAND = NUM_WRIST + NUM_HINGES
 
 
@@ -25,14 +27,15 @@ class World:
         rigid: the person's hand.
         table: the object and where it stands.
         start: where the hand is at first.
-        gains: of its joints.
+        assist: one of `ASSISTS`: fingers as they are tracked, or pressing what they touch.
 
     Attributes:
         model, data: MuJoCo's.
         timestep: s.
     """
 
-    def __init__(self, rigid: RigidHand, table: Tabletop, start: HandPose, gains: Gains | None = None):
+    def __init__(self, rigid: RigidHand, table: Tabletop, start: HandPose, assist: str = "off"):
+        gains = Gains()
         spec = scene_spec(rigid, table.object, table.support, table.support_position, np.eye(3), gains=gains)
         (self.model,) = gauss_seidel([spec.compile()])
         self.data = mujoco.MjData(self.model)
@@ -42,6 +45,11 @@ class World:
         self._object_start = table.pose
         self._low, self._high = self.model.actuator_ctrlrange[:_HAND].T
         self._wrist = Wrist(self.model, self.data)
+        self._grip: Grip | None = None
+        if assist == "grip":
+            body = int(self._bodies[-1])
+            notice_near(self.model, body)
+            self._grip = Grip(self.model, body, float(table.object.mass), float(table.object.friction), gains)
         self.reset(start)
 
     def reset(self, hand: HandPose) -> None:
@@ -60,7 +68,10 @@ class World:
     def step(self, target: HandPose) -> bool:
         """One physics step towards a target; False if it diverged: all is at rest then, the hand at the target."""
         self._wrist.keep_regular()
-        wanted = np.concatenate([self._wrist.coordinates(target.position, target.quaternion), target.angles])
+        angles = target.angles
+        if self._grip is not None:
+            angles = angles + self._grip.offsets(self.data, self.timestep)
+        wanted = np.concatenate([self._wrist.coordinates(target.position, target.quaternion), angles])
         self.data.ctrl[:] = np.clip(wanted, self._low, self._high)
         mujoco.mj_step(self.model, self.data)
         if any(self.data.warning[kind].number for kind in DIVERGED):

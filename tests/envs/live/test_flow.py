@@ -2,12 +2,14 @@
 
 import json
 import threading
+import time
 
 import numpy as np
 
 from envs.live.flow.histogram import Histogram
 from envs.live.flow.newest import Newest
 from envs.live.flow.timing import STAGES, Timing
+from envs.live.real_time import Pace
 
 
 def test_quantiles_are_those_of_the_times_to_a_twentieth():
@@ -57,3 +59,24 @@ def test_the_report_is_json_and_notices_of_strangers_do_not_grow_it():
     assert report["stages_ms"]["wire"]["max"] == 12.3
     assert len(report["notices"]) <= 32
     assert timing.notice == "notice 999"
+
+
+def test_steps_take_real_time_without_drift_and_a_machine_that_stood_still_is_said():
+    timing = Timing()
+    pace, began = Pace(0.004, timing), time.monotonic()
+    for k in range(250):
+        pace.wait()
+        assert time.monotonic() - began >= 0.004 * (k + 1) - 1e-3  # none is early
+        if k % 50 == 10:
+            time.sleep(0.03)  # made up for in the next steps
+    assert time.monotonic() - began < 1.2
+    assert timing.counts["seconds_skipped"] == 0
+    assert timing.stages["behind"].largest >= 0.025
+    time.sleep(0.4)
+    pace.wait()
+    began = time.monotonic()
+    for _ in range(25):
+        pace.wait()
+    assert time.monotonic() - began > 0.09  # what was missed is not made up for in a rush
+    assert timing.counts["seconds_skipped"] > 0.3
+    assert "stood still" in timing.notice

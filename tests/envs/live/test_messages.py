@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from envs.live.sources.messages import LONGEST, Messages
+from envs.live.sources.recorded import hinge_keypoints
 from mjx_hand.capture.keypoints.layouts import LAYOUTS, from_keypoints
 from mjx_hand.capture.keypoints.skeleton import rest_keypoints
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
+from mjx_hand.rigid.build import build_rigid_hand
 
 HAND = rest_keypoints(load_hand())[0] + np.array([0.1, 0.9, -0.3])
 WEBXR = LAYOUTS["webxr"]
@@ -55,6 +57,17 @@ def test_a_message_without_the_hand_says_that_it_is_not_seen(message: dict):
     found = Messages("right").keypoints(json.dumps(message))
     assert found is not None
     assert np.isnan(found).all()
+
+
+def test_of_two_hands_without_a_side_the_one_that_bends_as_it_does_is_followed():
+    angles = np.full((1, 20), 0.5)
+    still = np.zeros((1, 3)), np.array([[1.0, 0, 0, 0]])
+    both = {s: hinge_keypoints(angles, *still, build_rigid_hand(load_hand(side=s)))[0] for s in ("left", "right")}
+    message = json.dumps({"multiHandWorldLandmarks": [both["left"].tolist(), both["right"].tolist()]})
+    for side, points in both.items():
+        found = Messages(side).keypoints(message)
+        assert found is not None
+        np.testing.assert_allclose(found, points, atol=1e-9)
 
 
 def test_a_point_that_is_missing_or_infinite_is_missing():
