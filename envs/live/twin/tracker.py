@@ -9,6 +9,7 @@ from envs.live.twin.hand_solver import HandSolver
 from envs.live.twin.person import FRAMES, KnownHand, Person, measured_hand
 from envs.live.twin.placement import AS_IT_IS, place_hand
 from envs.live.twin.pose import HandPose
+from envs.live.twin.steady import Steady
 from mjx_hand.capture.keypoints.skeleton import rest_keypoints
 from mjx_hand.errors import InputError
 from mjx_hand.hand.load import load_hand
@@ -44,7 +45,7 @@ class Tracker:
         self._solver = HandSolver(
             measured_hand(np.tile(rest, (FRAMES, 1, 1)), side).rigid
         )  # compiles what measuring needs
-        self._person = Person(side)
+        self._person, self._steady = Person(side), Steady()
         self.hand: KnownHand | None = None
         self.known = 0.0
         self.placement = AS_IT_IS if up is None else None
@@ -71,13 +72,15 @@ class Tracker:
         assert self.hand is not None
         found = self._solver.solve(keypoints)
         if found is None:
+            self._steady.forget()
             return None
         position, quaternion, angles = found
         if self.placement is None:
             assert self._up is not None
             self.placement = place_hand(position, quaternion, self.hand.rigid, self._up, self._forward)
         place = self.placement
-        return HandPose(place.position(position), place.quaternion(quaternion), angles)
+        pose = HandPose(place.position(position), place.quaternion(quaternion), angles)
+        return self._steady.filtered(pose, at)
 
     def _follow(self, hand: KnownHand) -> None:
         self.hand, self.known = hand, 1.0

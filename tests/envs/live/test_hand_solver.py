@@ -28,16 +28,16 @@ def test_a_frame_alone_is_found_at_any_posture_and_turn(hand):
     angles, turns = postures(hand, 20, 1), Rotation.from_quat(rng.normal(size=(20, 4)))
     places = rng.normal(size=(20, 3))
     keypoints = hinge_keypoints(angles, places, turns.as_quat(scalar_first=True), hand)
-    off = []
+    off, solver = [], HandSolver(hand)
     for k, frame in enumerate(keypoints):
-        found = HandSolver(hand).solve(frame)
+        assert solver.solve(np.full((21, 3), np.nan)) is None  # so that the next follows none
+        found = solver.solve(frame)
         assert found is not None
         position, quaternion, bent = found
         off.append(np.abs(bent - angles[k]).max())
         np.testing.assert_allclose(position, places[k], atol=2e-3)
         assert (Rotation.from_quat(quaternion, scalar_first=True).inv() * turns[k]).magnitude() < 0.05
-    assert np.median(off) < 0.05
-    assert np.mean(np.array(off) < 0.15) >= 0.9
+    assert np.max(off) < 0.05
 
 
 def test_a_motion_is_followed_and_missing_keypoints_are_bridged(hand):

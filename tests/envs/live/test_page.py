@@ -22,6 +22,7 @@ from mjx_hand.capture.keypoints.layouts import LAYOUTS, from_keypoints
 from mjx_hand.hand.joints import LINKS
 from mjx_hand.hand.load import load_hand
 from mjx_hand.rigid.build import build_rigid_hand
+from tests.envs.live.test_server import Served
 from tests.view.browser.chromium import Page, find_chromium, page
 
 TOKEN, IWER = "0123456789abcdef", "iwer@2.5.0"
@@ -122,13 +123,15 @@ def test_an_emulated_hand_closes_the_twins_fingers_and_the_page_draws_them(tmp_p
 
 
 def test_a_browser_without_webxr_is_told_so(tmp_path):
-    with live(tmp_path) as session, page(chromium(), "about:blank", tmp_path / "profile") as opened:
+    made = Served()
+    with page(chromium(), "about:blank", tmp_path / "profile") as opened:
         opened.call("Page.enable")
         gone = "Object.defineProperty(navigator, 'xr', {value: undefined});"
         opened.call("Page.addScriptToEvaluateOnNewDocument", source=gone)
-        opened.call("Page.navigate", url=url(session))
+        opened.call("Page.navigate", url=f"http://localhost:{made.port}/?token={TOKEN}")
         until(opened, "document.getElementById('xr')?.textContent.includes('no WebXR')")
         assert run(opened, "document.getElementById('enter').hidden")
+    made.server.stop()
 
 
 @pytest.fixture(scope="session")
