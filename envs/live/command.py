@@ -138,7 +138,7 @@ def _address(text: str) -> tuple[str, int]:
         found = socket.getaddrinfo(host.strip("[]"), int(port), type=socket.SOCK_DGRAM)
     except OSError as error:
         raise InputError(f"--publish {text}: {host!r} is not found ({error.strerror}); give an address") from None
-    return found[0][4][0], int(port)
+    return str(found[0][4][0]), int(port)
 
 
 @contextlib.contextmanager

@@ -11,7 +11,7 @@ import tyro
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 from mjx_hand.files.npz_archive import replacing
-from train.benchmark import convergence, engines, keypoints, live, mjbatch, retarget, solver
+from train.benchmark import convergence, engines, keypoints, live, mjbatch, retarget, solver, streamed
 from train.benchmark.gpu import command as gpu
 
 MODULES = {
@@ -20,11 +20,12 @@ MODULES = {
     "gpu": gpu,
     "keypoints": keypoints,
     "live": live,
+    "streamed": streamed,
     "mjbatch": mjbatch,
     "retarget": retarget,
     "solver": solver,
 }
-BY_NAME = ("gpu", "live")  # need what few machines have, and a browser
+BY_NAME = ("gpu", "live", "streamed")  # need what few machines have: a browser, sets of demonstrations
 
 
 def main(argv: Sequence[str] | None = None) -> int:

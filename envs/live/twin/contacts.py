@@ -36,6 +36,8 @@ def touches(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> list[Touch
             continue
         of_second = np.zeros(6)
         mujoco.mj_contactForce(model, data, k, of_second)
+        if of_second[0] <= 0:
+            continue
         force = contact.frame.reshape(3, 3).T @ of_second[:3]
         second = bodies[1] == body
         link = model.body(bodies[0] if second else bodies[1]).name

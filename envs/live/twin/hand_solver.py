@@ -62,7 +62,7 @@ class HandSolver:
         Returns:
             None where too few are seen, or what is seen is no hand.
         """
-        seen = np.isfinite(keypoints).all(axis=1)
+        seen = np.asarray(np.isfinite(keypoints).all(axis=1))
         if seen.sum() < _FEWEST or seen[list(PALM)].sum() < _FEWEST_OF_PALM:
             self._follows = False
             return None
