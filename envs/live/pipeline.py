@@ -12,6 +12,7 @@ import numpy as np
 from envs.live.flow.arrival import Arrival
 from envs.live.flow.newest import Newest
 from envs.live.flow.timing import Timing
+from envs.live.flow.urgency import hurry
 from envs.live.service.feed import Feed
 from envs.live.service.snapshot import Snapshot
 from envs.live.service.state import state_message
@@ -103,6 +104,7 @@ class Pipeline:
 
     def _guarded(self, work: Callable[[], None]) -> None:
         """What fails in a thread is for whoever waits."""
+        hurry()
         try:
             work()
         except Exception as error:
@@ -151,13 +153,14 @@ class Pipeline:
         return found
 
     def _follow(self, keypoints: np.ndarray, arrival: Arrival) -> None:
-        start = time.monotonic()
+        known, start = self._tracker.hand is not None, time.monotonic()
         pose = self._tracker.pose(keypoints, arrival.at)
         ready = time.monotonic()
         if self._tracker.hand is None:
             self._state = f"measuring the hand: {100 * self._tracker.known:.0f} %; keep it open and in view"
             return
-        self._timing.add("retargeting", ready - start)
+        if known:  # the first frame waited for the hand to be built
+            self._timing.add("retargeting", ready - start)
         self._state = "following the hand" if pose is not None else "the hand is not seen"
         if pose is None:
             self._timing.count("lost")

@@ -11,15 +11,16 @@ import tyro
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 from mjx_hand.files.npz_archive import replacing
-from train.benchmark import convergence, engines, keypoints, live, mjbatch, retarget, solver, streamed
+from train.benchmark import convergence, engines, keypoints, mjbatch, retarget, solver
 from train.benchmark.gpu import command as gpu
+from train.benchmark.live import latency, streamed
 
 MODULES = {
     "convergence": convergence,
     "engines": engines,
     "gpu": gpu,
     "keypoints": keypoints,
-    "live": live,
+    "live": latency,
     "streamed": streamed,
     "mjbatch": mjbatch,
     "retarget": retarget,

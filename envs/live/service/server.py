@@ -16,6 +16,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from envs.live.flow.timing import Timing
+from envs.live.flow.urgency import hurry
 from envs.live.service.feed import Feed
 from envs.live.service.pictures import Drawn, pose_bytes
 from envs.live.service.requests import HAND, STATE, VIEW, Requests, path_of
@@ -83,7 +84,7 @@ class Server:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._started = threading.Event()
         self._failure: InputError | None = None
-        self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), daemon=True, name="live server")
+        self._thread = threading.Thread(target=self._run, daemon=True, name="live server")
 
     def start(self) -> None:
         """Serve.
@@ -102,6 +103,10 @@ class Server:
             with contextlib.suppress(RuntimeError):  # it has ended by itself
                 self._loop.call_soon_threadsafe(self._ended.set)
         self._thread.join()
+
+    def _run(self) -> None:
+        hurry()
+        asyncio.run(self._serve())
 
     async def _serve(self) -> None:
         self._loop, self._ended = asyncio.get_running_loop(), asyncio.Event()

@@ -14,9 +14,10 @@ from envs.scene import NUM_WRIST
 from mjx_hand.hand.joints import FINGERS, LINKS, NUM_HINGES
 from mjx_hand.rigid.gains import Gains
 
-NEAR = 0.005  # m: a phalanx that is closer to the object is taken to touch
-_SAFETY = 2.5  # times the force that just holds the object's weight by friction between thumb and fingers
+NEAR = 0.008  # m: a phalanx that is closer to the object is taken to touch
+_SAFETY = 4.0  # times the force that just holds the object's weight by friction between thumb and fingers
 _LEAST = 2.0  # N
+_DAMPING = 0.01  # m/rad, of the step that closes gaps
 _GRAVITY = 9.81
 _SOON = 0.15  # s over which a grip is taken up and let go: a finger that comes near does not snap shut
 _THUMB = FINGERS.index("thumb")
@@ -58,25 +59,30 @@ class Grip:
             data: as the last step left it.
             seconds: since the last call.
         """
-        wanted = np.zeros(NUM_HINGES)
+        torque, rows, gaps = np.zeros(NUM_HINGES), [], []
         nearest = self._nearest(data)
         fingers = {(link - 1) // 3 for link in nearest if link > 0}
         others = len(fingers - {_THUMB})
-        for link, (place, inward) in nearest.items():
+        for link, (gap, place, inward) in nearest.items():
             if link == 0 or not others:  # the palm is pressed against; a thumb alone presses nothing
                 continue
             finger = (link - 1) // 3
             phalanges = sum((other - 1) // 3 == finger for other in nearest if other > 0)
             share = 1.0 if finger == _THUMB else 1.0 / others
             mujoco.mj_jac(self._model, data, self._jacobian, None, place, self._model.body(LINKS[link]).id)
-            wanted += self._force * share / phalanges * (inward @ self._jacobian[:, _HINGES])
+            rows.append(inward @ self._jacobian[:, _HINGES])
+            gaps.append(max(gap, 0.0))
+            torque += self._force * share / phalanges * rows[-1]
         limit = self._gains.force_limit
-        wanted = np.clip(wanted, -limit, limit) / self._gains.stiffness
+        wanted = np.clip(torque, -limit, limit) / self._gains.stiffness
+        if rows:  # and a damped least-squares step that closes the gaps
+            lever = np.stack(rows)
+            wanted += lever.T @ np.linalg.solve(lever @ lever.T + _DAMPING**2 * np.eye(len(rows)), np.array(gaps))
         self._offsets += min(1.0, seconds / _SOON) * (wanted - self._offsets)
         return self._offsets
 
-    def _nearest(self, data: mujoco.MjData) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-        """Of each link that is near the object, its nearest place (m) and the way into the object there."""
+    def _nearest(self, data: mujoco.MjData) -> dict[int, tuple[float, np.ndarray, np.ndarray]]:
+        """Of each link that is near the object: the gap (m), its nearest place (m), the way into the object there."""
         found: dict[int, tuple[float, np.ndarray, np.ndarray]] = {}
         for contact in data.contact[: data.ncon]:
             first, second = (int(self._model.geom_bodyid[geom]) for geom in contact.geom)
@@ -87,4 +93,4 @@ class Grip:
             if link not in found or contact.dist < found[link][0]:
                 normal = contact.frame[:3] if second == self._body else -contact.frame[:3]
                 found[link] = (float(contact.dist), contact.pos.copy(), normal.copy())
-        return {link: (place, inward) for link, (_, place, inward) in found.items()}
+        return found

@@ -15,7 +15,7 @@ from envs.live.twin.pose import HandPose, moved, way
 _SLOWEST = 1.5  # Hz at rest
 _SPEEDS = 1.0  # Hz: of the low-pass of the speeds
 # Hz more by each m/s of the wrist, rad/s of its turn, rad/s of each hinge.
-_QUICKER = np.concatenate([np.full(3, 25.0), np.full(3, 3.0), np.full(20, 1.0)])
+_QUICKER = np.concatenate([np.full(3, 25.0), np.full(3, 3.0), np.full(20, 0.6)])
 _SKIPPED = 0.5  # s after which a pose follows none
 
 

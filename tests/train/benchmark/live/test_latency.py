@@ -4,7 +4,7 @@ import numpy as np
 
 from mjx_hand.hand.load import load_hand
 from mjx_hand.rigid.build import build_rigid_hand
-from train.benchmark.live import Options, _addresses, _fast, _motion
+from train.benchmark.live.latency import Options, _addresses, _fast, _motion
 
 
 def test_the_hand_goes_down_closes_and_comes_back():
