@@ -12,7 +12,6 @@ that jumps is taken as it is from then on.
 """
 
 import json
-import math
 from typing import Any
 
 import numpy as np
@@ -28,6 +27,7 @@ from mjx_hand.errors import InputError
 
 LONGEST = 2**16  # bytes; a hand's 25 joints as matrices take a tenth of it
 FARTHEST = 100.0  # m
+_LATEST = 1e18  # s, or ns: no clock says more
 _JUMP = 1.0  # s by which a clock goes back only if it was set
 _PLACES = ("hands", "keypoints", "joints", "right", "left", "landmarks", "worldLandmarks")  # that may be empty
 
@@ -76,7 +76,7 @@ class Messages:
 
     def _is_late(self, stamp: Any) -> bool:
         """Whether a message was overtaken by others, by its sender's clock."""
-        if isinstance(stamp, bool) or not isinstance(stamp, int | float) or not math.isfinite(stamp):
+        if isinstance(stamp, bool) or not isinstance(stamp, int | float) or not abs(stamp) < _LATEST:
             return False
         last, late = self._last, False
         if last is not None and abs(stamp - last) > _JUMP:
