@@ -26,7 +26,7 @@ def test_a_quick_hand_is_hardly_late():
         pose = moved(REST, speed * k / 60)
         shown = steady.filtered(pose, k / 60)
         late.append(way(shown, pose) @ speed / (speed @ speed))
-    assert max(late[20:]) < 0.04  # s
+    assert max(late[20:]) < 0.05  # s
 
 
 def test_what_follows_nothing_is_taken_as_it_is():
