@@ -13,17 +13,20 @@ from mjx_hand.errors import InputError
 from mjx_hand.files.npz_archive import replacing
 from train.benchmark import convergence, engines, keypoints, mjbatch, retarget, solver
 from train.benchmark.gpu import command as gpu
+from train.benchmark.live import latency, streamed
 
 MODULES = {
     "convergence": convergence,
     "engines": engines,
     "gpu": gpu,
     "keypoints": keypoints,
+    "live": latency,
+    "streamed": streamed,
     "mjbatch": mjbatch,
     "retarget": retarget,
     "solver": solver,
 }
-BY_NAME = ("gpu",)  # needs what few machines have
+BY_NAME = ("gpu", "live", "streamed")  # need what few machines have: a browser, sets of demonstrations
 
 
 def main(argv: Sequence[str] | None = None) -> int:

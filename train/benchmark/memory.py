@@ -14,12 +14,12 @@ _FULL = ("resource_exhausted", "out of memory", "failed to allocate")
 
 def with_memory(make: Callable[[], Contestant]) -> Contestant:
     """The contestant, made and run once, with the memory that it took."""
-    before = _resident("VmRSS")
+    before = resident("VmRSS")
     if before is not None:
         _FORGET.write_text("5")  # the peak begins anew (proc_pid_clear_refs(5))
     contestant = make()
     contestant.advance(contestant.unit)
-    peak = _resident("VmHWM")
+    peak = resident("VmHWM")
     host = None if before is None or peak is None else max(peak - before, 0)
     known = jax.devices()[0].memory_stats() or {}
     return dataclasses.replace(contestant, memory=Memory(host, known.get("peak_bytes_in_use")))
@@ -35,7 +35,8 @@ def fitting(make: Callable[[], Contestant]) -> Contestant | None:
         return None
 
 
-def _resident(field: str) -> int | None:
+def resident(field: str) -> int | None:
+    """What the system says of this process's memory (bytes), such as VmRSS; None where it says nothing."""
     if not _STATUS.is_file():
         return None
     (line,) = (line for line in _STATUS.read_text().splitlines() if line.startswith(f"{field}:"))

@@ -18,7 +18,7 @@ from mjx_hand.capture.keypoints.recording import SIDES, KeypointRecording, check
 from mjx_hand.errors import InputError
 
 MAX_HANDS = 2
-_OTHER = {"Left": "right", "Right": "left"}  # MediaPipe takes every image for a mirror's
+MIRRORED_SIDE = {"Left": "right", "Right": "left"}  # MediaPipe takes every image for a mirror's
 
 
 def track_video(path: str | Path, progress: Callable[[int, int], None] | None = None) -> dict[str, KeypointRecording]:
@@ -76,7 +76,7 @@ def _hands(result: Any) -> dict[str, Float[np.ndarray, "21 3"]]:
     for world, label in zip(worlds, labels, strict=True):
         kind = label.classification[0]
         points = np.array([[p.x, p.y, p.z] for p in world.landmark], float)
-        side = _OTHER[kind.label]
+        side = MIRRORED_SIDE[kind.label]
         if side not in found or found[side][0] < kind.score:
             found[side] = (kind.score, points)
     return {side: points for side, (_, points) in found.items()}

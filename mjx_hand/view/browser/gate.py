@@ -2,36 +2,30 @@
 
 Browsers let any page open a websocket to any address, and viser's server takes whoever comes: a page that is open
 beside the viewer could read the recording and steer it, or have it published through viser's share tunnel. Here
-requests are answered whose `Host` is this viewer's (which keeps out names that an attacker points at this computer,
-"DNS rebinding"), websockets whose `Origin`, where a browser states one, is the very page that the viewer serves (RFC
-6455, section 10.2), and of what clients send only where they look from and the values of controls, each checked.
+requests are answered that are for the viewer's own address (`address.OwnAddress`), and of what clients send viser hears
+only where they look from and the values of controls, each checked.
 """
 
 import asyncio
 import dataclasses
 import functools
 import http
-import ipaddress
 import logging
 import math
-import socket
 import threading
 import typing
 from collections.abc import Mapping
 from typing import Any
-from urllib.parse import urlsplit
 
 import msgspec
 import viser
 import websockets.asyncio.server
 from viser import _messages
-from websockets import Headers
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
-from mjx_hand.errors import InputError
+from mjx_hand.view.browser.address import OwnAddress
 
-EVERYWHERE = ("", "0.0.0.0", "::")  # addresses that stand for all of this computer
 _LARGEST = 2**16  # bytes of a message; a control's value takes a hundred
 _LONGEST = 2**12  # letters of a text
 _FAR = 1e6  # m, rad, pixels: what a camera says is less
@@ -71,31 +65,6 @@ def guarded_server(host: str, port: int, label: str) -> viser.ViserServer:
     return server
 
 
-def free_port(host: str, port: int) -> int:
-    """The port, or for 0 one that is free; viser would silently take another where it is not.
-
-    Raises:
-        InputError: it is taken, or is none.
-    """
-    if not 0 <= port <= 65535:
-        raise InputError(f"cannot serve at {host}:{port}: ports are 0 to 65535; choose another --port")
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, port))
-        except OSError as error:
-            raise InputError(f"cannot serve at {host}:{port}: {error.strerror}; choose another --port") from None
-        return probe.getsockname()[1]
-
-
-def is_public(host: str) -> bool:
-    """Whether other computers can reach a server that listens on this address."""
-    try:
-        return not ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host != "localhost"
-
-
 class _Gate:
     """What is let in.
 
@@ -105,10 +74,7 @@ class _Gate:
     """
 
     def __init__(self, host: str):
-        self._names = {"localhost", "127.0.0.1", "::1", host.lower()}
-        self._everywhere = host in EVERYWHERE
-        if self._everywhere:
-            self._names |= {socket.gethostname().lower(), socket.getfqdn().lower()}
+        self._address = OwnAddress(host)
         self.server: viser.ViserServer | None = None
         self.stands = False
 
@@ -116,7 +82,7 @@ class _Gate:
         """viser's `answer` to a request, or a refusal."""
 
         def process_request(connection: ServerConnection, request: Request) -> Response | None:
-            if not self.knows(request.headers):
+            if not self._address.knows(request.headers):
                 text = "This viewer answers pages of its own address only; see --host of mjx-hand view.\n"
                 return connection.respond(http.HTTPStatus.FORBIDDEN, text)
             response = answer(connection, request)
@@ -125,21 +91,6 @@ class _Gate:
             return response
 
         return process_request
-
-    def knows(self, headers: Headers) -> bool:
-        """Whether a request is for this viewer, and from its own page or from no page at all."""
-        hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
-        if len(hosts) != 1 or len(origins) > 1:
-            return False
-        try:
-            name = urlsplit(f"//{hosts[0]}").hostname or ""
-            known = name in self._names or (self._everywhere and _is_address(name))
-            return known and all(
-                urlsplit(o).scheme in ("http", "https") and urlsplit(o).netloc.lower() == hosts[0].lower()
-                for o in origins
-            )
-        except ValueError:
-            return False
 
     def takes(self, message: str | bytes) -> bool:
         """Whether a message is one that viser can do something with: a camera, or a new value of a control."""
@@ -184,14 +135,6 @@ def _silent() -> logging.Logger:
     logger.propagate = False
     logger.addHandler(logging.NullHandler())
     return logger
-
-
-def _is_address(name: str) -> bool:
-    try:
-        ipaddress.ip_address(name)
-    except ValueError:
-        return False
-    return True
 
 
 def _is_camera(told: Mapping[str, Any]) -> bool:

@@ -14,7 +14,8 @@ from viser import uplot
 
 from mjx_hand.errors import InputError
 from mjx_hand.pytree import replace
-from mjx_hand.view.browser.gate import EVERYWHERE, free_port, guarded_server, is_public
+from mjx_hand.view.browser.address import browser_address, free_port, is_public
+from mjx_hand.view.browser.gate import guarded_server
 from mjx_hand.view.browser.nodes import Handle, Show, add_layer
 from mjx_hand.view.browser.playback import SPEEDS, Playback
 from mjx_hand.view.browser.scene import Scene, check_scene, positions
@@ -71,8 +72,7 @@ class Viewer:
     @property
     def url(self) -> str:
         """Where to point a browser on this computer."""
-        here = "localhost" if self.host in EVERYWHERE or not self.public else self.host
-        return f"http://{here}:{self.server.get_port()}"
+        return f"http://{browser_address(self.host)}:{self.server.get_port()}"
 
     @property
     def public(self) -> bool:

@@ -13,7 +13,7 @@ import viser
 import websockets
 from websockets.asyncio.client import connect
 
-from mjx_hand.view.browser.gate import _Gate
+from mjx_hand.view.browser.address import OwnAddress
 from mjx_hand.view.browser.scene import PointLayer, Scene
 from mjx_hand.view.browser.viewer import Viewer
 
@@ -121,9 +121,9 @@ def test_other_hosts_are_refused(viewer, host):
 
 
 def test_everywhere_is_any_address_and_this_computers_names_but_no_others():
-    gate = _Gate("0.0.0.0")
+    address = OwnAddress("0.0.0.0")
     for host, known in (("192.168.1.5:8080", True), ("localhost", True), ("rebind.evil.example", False)):
-        assert gate.knows(websockets.Headers(Host=host)) == known
+        assert address.knows(websockets.Headers(Host=host)) == known
 
 
 def test_a_browser_may_steer_but_not_publish(viewer, monkeypatch):

@@ -1,0 +1,1 @@
+"""Where a hand's keypoints come from: recordings, sockets, headsets, cameras."""

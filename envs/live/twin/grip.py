@@ -1,0 +1,96 @@
+"""`Grip`: what a hesitant hand must press with so that it holds: dq = J^T f / kp at the phalanges that touch.
+
+A tracked hand shows where fingers are, not how hard they press. As in the references of training (`envs.grip`), the
+thumb presses with a force, the fingers that touch share as much between them, and each spreads its share over its
+phalanges; a hand whose thumb does not touch presses against the palm. Here contacts and derivatives are the C engine's,
+at the very state.
+"""
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from envs.scene import NUM_WRIST
+from mjx_hand.hand.joints import FINGERS, LINKS, NUM_HINGES
+from mjx_hand.rigid.gains import Gains
+
+NEAR = 0.008  # m: a phalanx that is closer to the object is taken to touch
+_SAFETY = 4.0  # times the force that just holds the object's weight by friction between thumb and fingers
+_LEAST = 2.0  # N
+_DAMPING = 0.01  # m/rad, of the step that closes gaps
+_GRAVITY = 9.81
+_SOON = 0.15  # s over which a grip is taken up and let go: a finger that comes near does not snap shut
+_THUMB = FINGERS.index("thumb")
+_HINGES = slice(NUM_WRIST, NUM_WRIST + NUM_HINGES)
+
+
+def notice_near(model: mujoco.MjModel, body: int) -> None:
+    """Have the engine list what is nearer than `NEAR` to an object, without pushing it.
+
+    Args:
+        model: changed in place.
+        body: the object's.
+    """
+    of_hand = np.isin(model.geom_bodyid, [model.body(name).id for name in LINKS]) & (model.geom_contype > 0)
+    model.geom_margin[of_hand], model.geom_gap[of_hand] = NEAR, NEAR
+
+
+class Grip:
+    """The press of one hand on one object.
+
+    Args:
+        model: after `notice_near`.
+        body: the object's.
+        mass, friction: of the object, kg.
+        gains: of the hand's joints.
+    """
+
+    def __init__(self, model: mujoco.MjModel, body: int, mass: float, friction: float, gains: Gains):
+        self._model, self._body, self._gains = model, body, gains
+        self._links = {model.body(name).id: k for k, name in enumerate(LINKS)}
+        self._force = max(_LEAST, _SAFETY * mass * _GRAVITY / (2 * friction))
+        self._jacobian = np.zeros((3, model.nv))
+        self._offsets = np.zeros(NUM_HINGES)
+
+    def offsets(self, data: mujoco.MjData, seconds: float) -> Float[np.ndarray, "20"]:
+        """What to add to the hinges' targets (rad).
+
+        Args:
+            data: as the last step left it.
+            seconds: since the last call.
+        """
+        torque, rows, gaps = np.zeros(NUM_HINGES), [], []
+        nearest = self._nearest(data)
+        fingers = {(link - 1) // 3 for link in nearest if link > 0}
+        others = len(fingers - {_THUMB})
+        for link, (gap, place, inward) in nearest.items():
+            if link == 0 or not others:  # the palm is pressed against; a thumb alone presses nothing
+                continue
+            finger = (link - 1) // 3
+            phalanges = sum((other - 1) // 3 == finger for other in nearest if other > 0)
+            share = 1.0 if finger == _THUMB else 1.0 / others
+            mujoco.mj_jac(self._model, data, self._jacobian, None, place, self._model.body(LINKS[link]).id)
+            rows.append(inward @ self._jacobian[:, _HINGES])
+            gaps.append(max(gap, 0.0))
+            torque += self._force * share / phalanges * rows[-1]
+        limit = self._gains.force_limit
+        wanted = np.clip(torque, -limit, limit) / self._gains.stiffness
+        if rows:  # and a damped least-squares step that closes the gaps
+            lever = np.stack(rows)
+            wanted += lever.T @ np.linalg.solve(lever @ lever.T + _DAMPING**2 * np.eye(len(rows)), np.array(gaps))
+        self._offsets += min(1.0, seconds / _SOON) * (wanted - self._offsets)
+        return self._offsets
+
+    def _nearest(self, data: mujoco.MjData) -> dict[int, tuple[float, np.ndarray, np.ndarray]]:
+        """Of each link that is near the object: the gap (m), its nearest place (m), the way into the object there."""
+        found: dict[int, tuple[float, np.ndarray, np.ndarray]] = {}
+        for contact in data.contact[: data.ncon]:
+            first, second = (int(self._model.geom_bodyid[geom]) for geom in contact.geom)
+            other = first if second == self._body else second
+            link = self._links.get(other)
+            if link is None or self._body not in (first, second):
+                continue
+            if link not in found or contact.dist < found[link][0]:
+                normal = contact.frame[:3] if second == self._body else -contact.frame[:3]
+                found[link] = (float(contact.dist), contact.pos.copy(), normal.copy())
+        return found

@@ -1,0 +1,1 @@
+"""The live twin, measured: where its time goes, and what it holds."""
