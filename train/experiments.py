@@ -4,7 +4,8 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from envs.demonstrations.dataset import make_missing_sets
+from envs.demonstrations.dataset import make_missing_sealed, make_missing_sets
+from envs.demonstrations.load_set import SEALED
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 from train.evaluate import evaluate_and_write
@@ -90,6 +91,8 @@ def measure(configs: Sequence[Config]) -> Experiment:
     summary = cached_results(configs) if finished and not configs[0].fresh else None
     if summary is None:
         make_missing_sets(configs[0].data, configs[0].demonstrations)
+        if configs[0].part == SEALED:
+            make_missing_sealed(configs[0].data, configs[0].demonstrations)
         env = training_env(configs[0])
         for config in configs:
             train(config, env)

@@ -4,15 +4,19 @@
 
 Without `names` the paper's five grasp types; any experiment of `configs/config` may be named. Overrides, such as
 `ppo.num_timesteps=300000`, hold for all of them. Writes `index.html`, `results.md` and `results.json` to `results`
-(outputs/results) after each experiment. What was trained and evaluated before with the same settings is kept, so that
-the same command goes on where it was stopped.
+(outputs/results) after each experiment. Grasp types are measured on their sealed part, which is made for that alone;
+`part=heldout` names another. What was trained and evaluated before with the same settings is kept, so that the same
+command goes on where it was stopped.
 """
 
+import dataclasses
 import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from envs.demonstrations.load_set import PARTS, SEALED
+from envs.grasps import grasp_names
 from mjx_hand.errors import InputError
 from train.experiment.evaluate_seeds import shared_folder
 from train.experiments import SEEDS, listed, measure, run_command, taken
@@ -21,6 +25,7 @@ from train.reports.results_table import FIVE, Experiment
 from train.settings.config import Config, compose_seeds
 
 FOLDER = "outputs/results"
+_, HELDOUT = PARTS
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -50,10 +55,18 @@ def plan(argv: Sequence[str]) -> tuple[list[list[Config]], Path]:
     if not any(a.startswith(("seed=", "seeds=")) for a in overrides):
         overrides.append(SEEDS)
     experiments = [compose_seeds([f"config={name}", *overrides]) for name in listed(own, "names", FIVE)]
+    if not any(a.startswith("part=") for a in overrides):
+        experiments = [[dataclasses.replace(c, part=_part(c)) for c in configs] for configs in experiments]
     folders = [shared_folder(configs) for configs in experiments]
     if len(set(folders)) < len(folders):
         raise InputError(f"out puts several experiments into {folders[0]}; put ${{name}} into it")
     return experiments, Path(own.get("results") or FOLDER)
+
+
+def _part(config: Config) -> str:
+    """The part of an experiment's demonstrations that results are of: the sealed one where there is one."""
+    sets = config.data.expand_types() or (config.data,)
+    return SEALED if all(single.grasp in grasp_names() for single in sets) else HELDOUT
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
 """Make a demonstration set, check it and show it: `mjx-hand demonstrations config=power data.people=2`.
 
 Takes the `data` part of an experiment's configuration (`configs/config/NAME.yaml`) and overrides of it, and
-`demonstrations=FOLDER`, below which sets are kept. Prints what came of all attempts and how good the demonstrations
-are, and writes a picture of them, `sheet.png`, into the set's folder.
+`demonstrations=FOLDER`, below which sets are kept; with `part=sealed` the part that stands apart is made. Prints what
+came of all attempts and how good the demonstrations are, and writes a picture of them, `sheet.png`, into the set's
+folder.
 """
 
 import json
@@ -17,8 +18,8 @@ from omegaconf import DictConfig, OmegaConf
 from PIL import Image
 
 from envs.demonstrations.contact_sheet import contact_sheet
-from envs.demonstrations.dataset import AS_RECORDED, VARIED, YIELD, make_set
-from envs.demonstrations.load_set import PARTS, load_part
+from envs.demonstrations.dataset import AS_RECORDED, VARIED, YIELD, make_sealed, make_set
+from envs.demonstrations.load_set import PARTS, SEALED, load_part
 from envs.demonstrations.quality import check_part
 from envs.demonstrations.recordings.recording_page import RECORDINGS
 from envs.demonstrations.scripted.perform import OUTCOMES
@@ -52,7 +53,7 @@ def settings_of(arguments: Sequence[str]) -> tuple[SetSettings, Path]:
     root = given.pop("demonstrations", _ROOT)
     unknown = [key for key in given if not key.startswith("data.")]
     if unknown:
-        raise InputError(f"{unknown[0]!r} is not an option; valid: config, demonstrations, data.*")
+        raise InputError(f"{unknown[0]!r} is not an option; valid: config, demonstrations, part={SEALED}, data.*")
     try:
         schema = OmegaConf.structured(SetSettings)
         _make_writable(schema)
@@ -76,23 +77,25 @@ def _make_writable(node: DictConfig) -> None:
 
 def main(arguments: Sequence[str]) -> None:
     """Make the set where it is missing, print its tables, write its picture; `config=all` does so for each type."""
-    settings, root = settings_of(arguments)
+    sealed = f"part={SEALED}" in arguments
+    settings, root = settings_of([argument for argument in arguments if argument != f"part={SEALED}"])
     enable_compile_cache()
     if settings.folder:
         raise InputError(f"{settings.folder}: these demonstrations are finished; leave out data.folder to make a set")
     for single in settings.expand_types():
-        _make_and_show(single, root)
+        _make_and_show(single, root, sealed)
 
 
-def _make_and_show(settings: SetSettings, root: Path) -> None:
+def _make_and_show(settings: SetSettings, root: Path, sealed: bool) -> None:
     with shares() as report:
-        folder = make_set(settings, root, report)
+        folder = make_sealed(settings, root, report) if sealed else make_set(settings, root, report)
+    parts = (SEALED,) if sealed else PARTS
     yields = json.loads((folder / YIELD).read_text())
-    quality = [] if settings.grasp == RECORDED else _quality_rows(folder)
-    print_table(str(folder), ("", *PARTS), _yield_rows(yields) + quality)
+    quality = [] if settings.grasp == RECORDED else _quality_rows(folder, parts)
+    print_table(str(folder), ("", *parts), _yield_rows(yields, parts) + quality)
     if settings.grasp == RECORDED:
         _print_recordings(folder)
-    demonstrations = load_part(folder, PARTS[0])
+    demonstrations = load_part(folder, parts[0])
     try:
         sheet = contact_sheet(demonstrations, twins(demonstrations))
     except RendererUnavailable as error:
@@ -105,15 +108,15 @@ def _make_and_show(settings: SetSettings, root: Path) -> None:
         print(f"picture: {path}")
 
 
-def _yield_rows(yields: Mapping[str, Mapping[str, int]]) -> list[tuple[str, ...]]:
+def _yield_rows(yields: Mapping[str, Mapping[str, int]], parts: Sequence[str]) -> list[tuple[str, ...]]:
     known = (*OUTCOMES, NO_POSTURE, SPARE, AS_RECORDED, VARIED)
     outcomes = [o for o in known if any(o in tally for tally in yields.values())]
-    attempts = ("attempts", *(str(sum(yields[part].values())) for part in PARTS))
-    return [attempts, *((outcome, *(str(yields[part].get(outcome, 0)) for part in PARTS)) for outcome in outcomes)]
+    attempts = ("attempts", *(str(sum(yields[part].values())) for part in parts))
+    return [attempts, *((outcome, *(str(yields[part].get(outcome, 0)) for part in parts)) for outcome in outcomes)]
 
 
-def _quality_rows(folder: Path) -> list[tuple[str, ...]]:
-    measured = [check_part(folder, part) for part in PARTS]
+def _quality_rows(folder: Path, parts: Sequence[str]) -> list[tuple[str, ...]]:
+    measured = [check_part(folder, part) for part in parts]
     return [
         ("length (s)", *(_range(q.seconds) for q in measured)),
         ("lift (cm)", *(_range(100 * q.lift) for q in measured)),

@@ -10,19 +10,19 @@ each, and neither motions nor truth.
 import dataclasses
 import json
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from envs.demonstrations.load_set import PARTS, demonstration_files
+from envs.demonstrations.load_set import PARTS, SEALED, demonstration_files
 from envs.demonstrations.recordings.recorded_set import recorded_set
 from envs.demonstrations.recordings.recording_page import write_pages
 from envs.demonstrations.recordings.variations import divided
 from envs.demonstrations.scripted.own_object import own_object
 from envs.demonstrations.scripted.simulated_capture import load_truth, project_recording, record_trials, save_truth
 from envs.demonstrations.scripted.trials import perform_trials
-from envs.demonstrations.set_settings import SetSettings, set_folder
+from envs.demonstrations.set_settings import SetSettings, sealed_folder, sealed_seed, set_folder
 from envs.grasps import grasp_type
 from envs.grip_force import RECORDED
 from mjx_hand.files.npz_archive import replacing
@@ -51,11 +51,24 @@ def make_missing_sets(settings: SetSettings, root: str | Path) -> None:
         InputError: as `make_set`.
     """
     for single in settings.expand_types():
-        folder = set_folder(single, root)
-        if not folder.is_dir():
-            print(f"{folder} is missing: making the demonstrations", flush=True)
-            with shares() as report:
-                make_set(single, root, report)
+        _make_missing(set_folder(single, root), lambda report, single=single: make_set(single, root, report))
+
+
+def make_missing_sealed(settings: SetSettings, root: str | Path) -> None:
+    """Make those sealed parts that the settings stand for and that are not below `root`, and say so.
+
+    Raises:
+        InputError: as `make_sealed`.
+    """
+    for single in settings.expand_types():
+        _make_missing(sealed_folder(single, root), lambda report, single=single: make_sealed(single, root, report))
+
+
+def _make_missing(folder: Path, make: Callable[[Report], Path]) -> None:
+    if not folder.is_dir():
+        print(f"{folder} is missing: making the demonstrations", flush=True)
+        with shares() as report:
+            make(report)
 
 
 def make_set(settings: SetSettings, root: str | Path, report: Report = lambda what, share: None) -> Path:
@@ -73,7 +86,7 @@ def make_set(settings: SetSettings, root: str | Path, report: Report = lambda wh
             yields = _make_variations(settings, temporary, report)
         elif settings.side == "left":
             right = dataclasses.replace(settings, side="right")
-            yields = _mirror(make_set(right, root, report), temporary)
+            yields = _mirror(make_set(right, root, report), temporary, PARTS)
         elif (usual := dataclasses.replace(settings, capture=settings.capture.projected_as_usual())) != settings:
             yields = _project_again(settings, make_set(usual, root, report), temporary, report)
         else:
@@ -82,16 +95,43 @@ def make_set(settings: SetSettings, root: str | Path, report: Report = lambda wh
                 part: _make_part(settings, people, settings.seed + offset * _APART, temporary / part, part, report)
                 for offset, (part, people) in enumerate(parts.items())
             }
-        for name, told in ((YIELD, yields), ("settings.json", dataclasses.asdict(settings))):
-            with replacing(temporary / name) as file:
-                file.write_text(json.dumps(told, indent=1))
-        temporary.chmod(0o755)
-        try:
-            temporary.rename(folder)
-        except OSError:
-            if not folder.is_dir():  # another process may have made the same set meanwhile: then its is as good
-                raise
+        _finish(temporary, folder, settings, yields)
     return folder
+
+
+def make_sealed(settings: SetSettings, root: str | Path, report: Report = lambda what, share: None) -> Path:
+    """The folder of the sealed part of a set, `sealed/NNN.npz`, made if it is not there; whole or not at all.
+
+    Raises:
+        InputError: as `sealed_folder`, the folder cannot be written, or the grasp fails too often.
+    """
+    folder = sealed_folder(settings, root)
+    if folder.is_dir():
+        remove_abandoned(folder)
+        return folder
+    with working_folder(folder) as temporary:
+        if settings.side == "left":
+            right = make_sealed(dataclasses.replace(settings, side="right"), root, report)
+            yields = _mirror(right, temporary, [SEALED])
+        else:
+            made = dataclasses.replace(settings, trials=settings.sealed_trials)
+            people, seed = settings.sealed_people, sealed_seed(settings)
+            yields = {SEALED: _make_part(made, people, seed, temporary / SEALED, SEALED, report)}
+        _finish(temporary, folder, settings, yields)
+    return folder
+
+
+def _finish(temporary: Path, folder: Path, settings: SetSettings, yields: Mapping[str, Mapping[str, int]]) -> None:
+    """Write what was made of which settings, and give the folder its name."""
+    for name, told in ((YIELD, yields), ("settings.json", dataclasses.asdict(settings))):
+        with replacing(temporary / name) as file:
+            file.write_text(json.dumps(told, indent=1))
+    temporary.chmod(0o755)
+    try:
+        temporary.rename(folder)
+    except OSError:
+        if not folder.is_dir():  # another process may have made the same set meanwhile: then its is as good
+            raise
 
 
 def _make_part(
@@ -148,9 +188,9 @@ def _project_again(settings: SetSettings, usual: Path, folder: Path, report: Rep
     return json.loads((usual / YIELD).read_text())
 
 
-def _mirror(right: Path, folder: Path) -> Mapping[str, Mapping[str, int]]:
-    """Make both parts as mirror images of a set's, with their motions and truths; what came of that set's attempts."""
-    for path in (path for part in PARTS for path in demonstration_files(right, part)):
+def _mirror(right: Path, folder: Path, parts: Sequence[str]) -> Mapping[str, Mapping[str, int]]:
+    """Make parts as mirror images of a set's, with their motions and truths; what came of that set's attempts."""
+    for path in (path for part in parts for path in demonstration_files(right, part)):
         there = folder / path.parent.name
         there.mkdir(exist_ok=True)
         save_demonstration(mirrored_demonstration(load_demonstration(path)), there / path.name)

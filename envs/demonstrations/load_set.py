@@ -3,12 +3,13 @@
 import hashlib
 from pathlib import Path
 
-from envs.demonstrations.set_settings import GIVEN, SetSettings, set_folder
+from envs.demonstrations.set_settings import GIVEN, SetSettings, sealed_folder, set_folder
 from envs.grasps import grasp_names
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import Demonstration, load_demonstration
 
 PARTS = ("train", "heldout")
+SEALED = "sealed"  # what nothing is tuned on: made and evaluated apart, at the end
 
 
 def load_demonstrations(settings: SetSettings, part: str, root: str | Path) -> list[Demonstration]:
@@ -16,7 +17,7 @@ def load_demonstrations(settings: SetSettings, part: str, root: str | Path) -> l
 
     Args:
         settings: of a set, or of a folder of finished demonstrations.
-        part: "train" or "heldout".
+        part: "train", "heldout" or "sealed".
         root: folder below which sets are kept.
 
     Raises:
@@ -26,12 +27,13 @@ def load_demonstrations(settings: SetSettings, part: str, root: str | Path) -> l
         return load_part(settings.folder, part)
     demonstrations = []
     for single in settings.expand_types():
-        folder = set_folder(single, root)
+        folder = sealed_folder(single, root) if part == SEALED else set_folder(single, root)
         if not folder.is_dir():
             config = single.grasp if single.grasp in grasp_names() else "NAME"
             raise InputError(
                 f"{folder}: this demonstration set is not made yet; make it first: python -m envs.demonstrations "
-                f"config={config}, with the same data.* and demonstrations=FOLDER"
+                f"config={config}{f' part={SEALED}' if part == SEALED else ''}, with the same data.* and "
+                "demonstrations=FOLDER"
             )
         demonstrations += load_part(folder, part)
     return demonstrations
@@ -47,8 +49,8 @@ def load_part(folder: str | Path, part: str) -> list[Demonstration]:
 
 
 def is_divided(folder: str | Path) -> bool:
-    """Whether a folder has a part for training or one held out."""
-    return any(Path(folder, part).is_dir() for part in PARTS)
+    """Whether a folder has a part for training, one held out or a sealed one."""
+    return any(Path(folder, part).is_dir() for part in (*PARTS, SEALED))
 
 
 def demonstration_files(folder: str | Path, part: str) -> list[Path]:
@@ -57,8 +59,8 @@ def demonstration_files(folder: str | Path, part: str) -> list[Path]:
     Raises:
         InputError: no such folder or part, or it holds no demonstrations.
     """
-    if part not in PARTS:
-        raise InputError(f"part {part!r} is not known; valid: {', '.join(PARTS)}")
+    if part not in (*PARTS, SEALED):
+        raise InputError(f"part {part!r} is not known; valid: {', '.join((*PARTS, SEALED))}")
     if not Path(folder).is_dir():
         raise InputError(f"{folder}: no such folder; give one that holds finished demonstrations, NNN.npz")
     where = Path(folder, part) if is_divided(folder) else Path(folder)

@@ -30,6 +30,8 @@ class SetSettings:
         people: random hand shapes in the training part.
         heldout_people: others, in the held-out part.
         trials: demonstrations of each person.
+        sealed_people, sealed_trials: those of the sealed part, which is made and evaluated apart, after everything was
+            chosen (`sealed_folder`).
         seed: of every draw; the held-out part uses the next one.
         capture: how they are recorded.
         recording: the real recording, and how it is varied; of the other settings it uses the seed.
@@ -44,6 +46,8 @@ class SetSettings:
     people: int = 8
     heldout_people: int = 4
     trials: int = 8
+    sealed_people: int = 20
+    sealed_trials: int = 3
     seed: int = 0
     capture: CaptureSettings = dataclasses.field(default_factory=CaptureSettings)
     recording: RecordingSettings = dataclasses.field(default_factory=RecordingSettings)
@@ -84,7 +88,7 @@ class SetSettings:
             )
         if self.object_mass is not None and self.object_density is not None:
             raise InputError("both data.object_mass and data.object_density are given; give one of them")
-        for name in ("people", "heldout_people", "trials"):
+        for name in ("people", "heldout_people", "trials", "sealed_people", "sealed_trials"):
             if getattr(self, name) < 1:
                 raise InputError(f"data.{name} is {getattr(self, name)}; it must be at least 1")
         if self.seed < 0:
@@ -110,16 +114,47 @@ def set_folder(settings: SetSettings, root: str | Path) -> Path:
         del recording["path"]  # what it holds tells, not where it is
         ingredients = [_RECORDED_VERSION, settings.seed, recording, recording_digest(settings.recording.path)]
     else:
-        grasp = dataclasses.asdict(grasp_type(settings.grasp))
-        del grasp["grip_force"]  # it is the twin's: the same demonstrations are made whatever it is
-        ingredients.append(grasp)
-    content = json.dumps(ingredients, sort_keys=True)
-    return Path(root) / f"{settings.grasp}-{hashlib.sha256(content.encode()).hexdigest()[:10]}"
+        ingredients.append(_performed(settings.grasp))
+    return Path(root) / f"{settings.grasp}-{_digest(ingredients)[:10]}"
+
+
+def sealed_folder(settings: SetSettings, root: str | Path) -> Path:
+    """Where the sealed part of a set lives: other people and objects, of a seed that no other part or type has.
+
+    Raises:
+        InputError: demonstrations of recordings or given ones, which have no such part.
+    """
+    if settings.grasp not in grasp_names():
+        raise InputError(
+            f"demonstrations of {settings.grasp!r} have no sealed part, which scripted grasp types have; "
+            "evaluate the part 'heldout'"
+        )
+    told = fingerprint(settings)
+    told |= {"people": settings.sealed_people, "trials": settings.sealed_trials}
+    del told["heldout_people"]
+    return Path(root) / f"{settings.grasp}-sealed-{_digest([_VERSION, told, _performed(settings.grasp)])[:10]}"
+
+
+def sealed_seed(settings: SetSettings) -> int:
+    """The seed of a type's sealed part, far from those of the other parts and of other types."""
+    return int(_digest(["sealed", settings.seed, settings.grasp])[:8], 16)
+
+
+def _performed(grasp: str) -> dict[str, Any]:
+    """What of a grasp type decides on its demonstrations."""
+    performed = dataclasses.asdict(grasp_type(grasp))
+    del performed["grip_force"]  # it is the twin's: the same demonstrations are made whatever it is
+    return performed
+
+
+def _digest(ingredients: Any) -> str:
+    return hashlib.sha256(json.dumps(ingredients, sort_keys=True).encode()).hexdigest()
 
 
 def fingerprint(settings: SetSettings) -> dict[str, Any]:
     """All settings that tell sets apart, as in `CaptureSettings.fingerprint`."""
     told = dataclasses.asdict(settings) | {"capture": settings.capture.fingerprint()}
+    del told["sealed_people"], told["sealed_trials"]  # of a part that stands apart
     del told["folder"]  # what it holds tells, not where it is: `load_set.part_digest`
     if settings.grasp != RECORDED:
         del told["recording"]

@@ -50,6 +50,8 @@ def summary(grasp: str, success: Sequence[float], zero: float = 0.25, failed: Se
             "zero residual": scores(zero),
             "demonstration alone": scores(0.0),
         },
+        "part": "sealed",
+        "people": {"pinch 0": scores(0.5), "pinch 1": scores(0.9)},
         "intervals": {"policy": {"kept": (0.5, 0.99)}},
         "seeds": {str(seed): scores(value) for seed, value in enumerate(success)},
         "failures": {"policy": shares | {"dropped": 1 - sum(success) / len(success)}, "zero residual": shares},
@@ -73,6 +75,7 @@ def test_a_row_an_experiment_with_the_papers_beside():
     table = results_table([experiment("pinch", [1.0, 0.9]), experiment("lateral", [0.8, 1.0], zero=0.5)])
     shown = row(table, "lateral")
     assert (shown["followed"], shown["least seed"]) == ("90.0 % (50 to 99)", "80.0 %")
+    assert shown["least person"] == "50.0 %"
     assert (shown["paper's success"], shown["paper's tracking error"]) == ("80.2 %", "0.75 cm")
     assert (shown["zero residual"], shown["demonstration alone"]) == ("50.0 %", "0.0 %")
     assert [shown[f"constant press{what}"] for what in ("", ", ManipTrans")] == ["75.0 %", "70.0 %"]

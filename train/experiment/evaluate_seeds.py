@@ -1,4 +1,4 @@
-"""The policies of several seeds on held-out demonstrations, beside three baselines that do not learn.
+"""The policies of several seeds on demonstrations that they have not seen, beside three baselines that do not learn.
 
 The baselines are one constant press for each grasp type, the best on training demonstrations
 (`envs.evaluation.constant_press`); the same reference with a residual of zero; and the demonstration replayed as it is.
@@ -30,6 +30,11 @@ from train.settings.saved import differing, policy_settings
 HOLD = 5.0  # s after the demonstration, for the hold metric
 POLICY, PRESS, ZERO, REPLAY = "policy", "constant press", "zero residual", "demonstration alone"
 BASELINES = (PRESS, ZERO, REPLAY)
+PART_WORDS = {
+    "train": "training demonstrations",
+    "heldout": "held-out demonstrations",
+    "sealed": "demonstrations of the sealed part",
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,12 +57,11 @@ class Results:
     overlaps: Mapping[str, Overlap]
 
 
-def evaluate_seeds(configs: Sequence[Config], part: str = "heldout") -> dict[int, Results]:
-    """Roll out each seed's policy and the baselines on one part of the demonstrations and score them, by seed.
+def evaluate_seeds(configs: Sequence[Config]) -> dict[int, Results]:
+    """Roll out each seed's policy and the baselines on the part that the configuration names and score them, by seed.
 
     Args:
         configs: an experiment with one seed after the other, as `train.settings.config.expand_seeds` makes them.
-        part: "heldout" or "train".
 
     Raises:
         InputError: a seed without a checkpoint, or with one of another task.
@@ -69,6 +73,7 @@ def evaluate_seeds(configs: Sequence[Config], part: str = "heldout") -> dict[int
                 f"seeds {configs[0].seed} and {config.seed} were trained with other {', '.join(others)}; evaluate each "
                 "alone"
             )
+    part = configs[0].part
     env = load_env(configs[0], part)
     checkpoints = {config.seed: chosen_checkpoint(config, env.observation_size, env.action_size) for config in configs}
     objects = [demonstration.object for demonstration in env.demonstrations]
@@ -102,9 +107,9 @@ def evaluate_seeds(configs: Sequence[Config], part: str = "heldout") -> dict[int
     }
 
 
-def evaluate_checkpoint(config: Config, part: str = "heldout") -> Results:
+def evaluate_checkpoint(config: Config) -> Results:
     """The results of one seed, as `evaluate_seeds`."""
-    return evaluate_seeds([config], part)[config.seed]
+    return evaluate_seeds([config])[config.seed]
 
 
 def median_and_worst(evaluations: Mapping[int, Evaluation]) -> dict[str, tuple[int, int]]:

@@ -24,7 +24,7 @@ from train.settings.saved import FILE, contradiction, policy_settings, read_sett
 
 
 def load_env(config: Config, part: str, randomize: Randomize | None = None) -> TrackingEnv:
-    """The environment over one part ("train", "heldout") of the experiment's demonstrations.
+    """The environment over one part ("train", "heldout", "sealed") of the experiment's demonstrations.
 
     Args:
         config: the experiment.

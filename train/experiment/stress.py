@@ -55,27 +55,28 @@ class Stress:
         policies: by row, the evaluation of each seed's policy.
         press: by row, that of the constant press.
         strengths: the press's, in words, by grasp type.
+        part: of the demonstrations.
     """
 
     policies: Mapping[str, Mapping[int, Evaluation]]
     press: Mapping[str, Evaluation]
     strengths: Mapping[str, str]
+    part: str
 
 
-def stress(configs: Sequence[Config], part: str = "heldout") -> Stress:
+def stress(configs: Sequence[Config]) -> Stress:
     """Roll out each seed's policy and the constant press under every row.
 
     The press is the strongest that searches on the training demonstrations find: as recorded, and disturbed as training
     was. In each row it is the better of the two, which is more than anyone could know beforehand.
 
     Args:
-        configs: an experiment with one seed after the other.
-        part: "heldout" or "train".
+        configs: an experiment with one seed after the other, which names the part of the demonstrations.
 
     Raises:
         InputError: a seed without a checkpoint, or with one of another task.
     """
-    first = configs[0]
+    first, part = configs[0], configs[0].part
     recorded = load_env(first, part, ROWS[RECORDED])
     checkpoints = {
         config.seed: chosen_checkpoint(config, recorded.observation_size, recorded.action_size) for config in configs
@@ -107,4 +108,4 @@ def stress(configs: Sequence[Config], part: str = "heldout") -> Stress:
     strengths = {
         grasp: " or ".join(dict.fromkeys(press.described(each)[grasp] for each in known)) for grasp in press.full
     }
-    return Stress(policies, presses, strengths)
+    return Stress(policies, presses, strengths, part)

@@ -9,14 +9,25 @@ from matplotlib.figure import Figure
 
 from envs.evaluation.evaluate import Evaluation
 from envs.evaluation.metrics import position_error
+from envs.evaluation.people import people_of, person_scores
 from mjx_hand.view.figures import plots
 from mjx_hand.view.report import Film, Headline, Plot, Report, Section, Table
-from train.experiment.evaluate_seeds import BASELINES, POLICY, PRESS, REPLAY, ZERO, Results, median_and_worst
+from train.experiment.evaluate_seeds import (
+    BASELINES,
+    PART_WORDS,
+    POLICY,
+    PRESS,
+    REPLAY,
+    ZERO,
+    Results,
+    median_and_worst,
+)
 from train.experiment.stress import Stress
 from train.reports.evaluation_record import mean_scores
 from train.reports.interval import intervals
 from train.reports.machine import processor, versions
 from train.reports.overlap_table import overlap_table
+from train.reports.people_table import people_table
 from train.reports.published import PAPER
 from train.reports.score_table import demonstration_table, failed_table, failure_table, score_table
 from train.reports.stress_table import stress_figure, stress_table
@@ -24,7 +35,7 @@ from train.reports.type_table import groups, type_table
 from train.settings.config import Config
 from train.view.video import film
 
-TRACKING = "Distance of the object from where the demonstration has it, on held-out demonstrations."
+TRACKING = "Distance of the object from where the demonstration has it."
 
 
 def tables(results: Mapping[int, Results], config: Config) -> tuple[Table, ...]:
@@ -35,7 +46,7 @@ def tables(results: Mapping[int, Results], config: Config) -> tuple[Table, ...]:
     first = next(iter(results.values()))
     count = len(first.env.demonstrations)
     note = (
-        f"{count} held-out demonstrations, every rollout counted, from frame 0, unassisted; "
+        f"{count} {PART_WORDS[config.part]}, every rollout counted, from frame 0, unassisted; "
         f"the paper does not define its success. Constant press: {pressed(first)}"
     )
     columns = {POLICY: [result.evaluations[POLICY] for result in results.values()]}
@@ -109,12 +120,14 @@ def evaluation_page(
     errors = [e.rows()["tracking_error_cm"] for e in policies.values()]
     paper = PAPER.get(config.data.grasp)
     failed = failed_table(policies)
+    people = person_scores(list(policies.values()), people_of(first.env.demonstrations))
     seeds = ", ".join(str(seed) for seed in policies)
     return Report(
         title=f"{config.name}: evaluation",
         task=(
-            f"{len(objects)} held-out demonstrations ({', '.join(dict.fromkeys(_grasps(first)))}), which training has "
-            "not seen, from the first frame to the last, unassisted; policies of "
+            f"{len(objects)} {PART_WORDS[config.part]} ({', '.join(dict.fromkeys(_grasps(first)))})"
+            f"{'' if config.part == 'train' else ', which training has not seen'}, from the first frame to the last, "
+            "unassisted; policies of "
             f"{len(policies)} training seed{'s' if len(policies) > 1 else ''}."
         ),
         headlines=(
@@ -151,6 +164,7 @@ def evaluation_page(
             Section("Demonstration and twin", [shown["worst"], shown["median"]]),
             Section("Tracking error over time", [Plot(tracking_plot(results), TRACKING)]),
             Section("The hand in itself and the ground", [overlaps(results)]),
+            *([Section("Every person", [people_table(people)])] if people else []),
             Section("How failures failed", [failures]),
             *([Section("Failures", [failed])] if failed.rows else []),
             Section("Every demonstration", [demonstration_table(policies, baselines, objects)]),

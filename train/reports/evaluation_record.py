@@ -14,6 +14,7 @@ import numpy as np
 from envs.demonstrations.load_set import PARTS, part_digest
 from envs.demonstrations.set_settings import fingerprint, set_folder
 from envs.evaluation.evaluate import Evaluation
+from envs.evaluation.people import people_of, person_scores
 from envs.grasps import grasp_names, grasp_type
 from mjx_hand.files.npz_archive import replacing
 from train.experiment.evaluate_seeds import POLICY, Results, shared_folder
@@ -43,6 +44,7 @@ def write_results(results: Mapping[int, Results], configs: Sequence[Config], fil
         "experiment": config.name,
         "grasp": config.data.grasp,
         "engine": first.env.engine.name,
+        "part": config.part,
         "checkpoint_steps": {seed: result.checkpoint.steps for seed, result in results.items()},
         "demonstrations": len(first.env.demonstrations),
         "scores": {
@@ -62,6 +64,7 @@ def write_results(results: Mapping[int, Results], configs: Sequence[Config], fil
             **{title: overlap_scores([first.overlaps[title]]) for title in baselines},
         },
         "constant_press": dict(first.press),
+        "people": person_scores(list(policies.values()), people_of(first.env.demonstrations)),
         "seeds": {seed: e.rows() for seed, e in policies.items()},
         "failures": {
             POLICY: mean_scores([e.failure_shares() for e in policies.values()]),
@@ -113,7 +116,7 @@ def evaluation_fingerprint(configs: Sequence[Config]) -> str:
         if config.data.folder:
             sets += [part_digest(config.data.folder, part) for part in PARTS]
         forces = [grasp_type(name).grip_force for name in grasp_names()]
-        told = [config.name, config.engine, config.seed, sets, forces, parts]
+        told = [config.name, config.part, config.engine, config.seed, sets, forces, parts]
         content.update(json.dumps(told, sort_keys=True).encode())
         policy = Path(config.checkpoint) if config.checkpoint else Path(config.out) / "best.npz"
         for path in (policy, Path(config.out) / "curve.csv"):

@@ -12,7 +12,7 @@ from envs.evaluation.failure import FAILURES
 from mjx_hand.files.npz_archive import replacing
 from mjx_hand.view.figures.learning_figure import learning_curves
 from mjx_hand.view.report import Film, Headline, Plot, Report, Section, Table, write_report
-from train.experiment.evaluate_seeds import POLICY
+from train.experiment.evaluate_seeds import PART_WORDS, POLICY
 from train.learning.curve import LEARNED
 from train.reports.machine import machine
 from train.reports.published import PAPER
@@ -68,7 +68,7 @@ def _page(experiments: Sequence[Experiment], waiting: Sequence[str], command: st
             ),
         ),
         sections=(
-            Section("Held-out demonstrations", [table]),
+            Section("Every experiment", [table]),
             Section("Learning", [_curves(experiment) for experiment in experiments]),
             Section("Demonstration and twin", [film for experiment in experiments for film in _films(experiment)]),
             Section("How failures failed", [_shares(experiments)]),
@@ -117,10 +117,11 @@ def _shares(experiments: Sequence[Experiment]) -> Table:
 
 def _made_with(experiment: Experiment) -> str:
     summary = experiment.summary
+    people = f" by {len(summary['people'])} people" if summary["people"] else ""
     steps = max(points[-1].steps for points in experiment.curves.values())
     return (
         f"seeds {', '.join(summary['seeds'])}; {steps:,} control steps; engine {summary['engine']}; "
-        f"{summary['demonstrations']} held-out demonstrations"
+        f"{summary['demonstrations']} {PART_WORDS[summary['part']]}{people}"
     )
 
 

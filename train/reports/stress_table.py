@@ -12,7 +12,7 @@ from envs.evaluation.evaluate import Evaluation
 from mjx_hand.files.npz_archive import replacing
 from mjx_hand.view.figures.stress_figure import shares_over
 from mjx_hand.view.report import Table
-from train.experiment.evaluate_seeds import POLICY, PRESS
+from train.experiment.evaluate_seeds import PART_WORDS, POLICY, PRESS
 from train.experiment.stress import CURVES, Stress
 from train.reports.evaluation_record import mean_scores, rollout_rows
 from train.reports.interval import wilson
@@ -32,7 +32,7 @@ def stress_table(stress: Stress) -> Table:
     columns = ("disturbance", POLICY, names, PRESS, names)
     strengths = ", ".join(f"{grasp} {constant}" for grasp, constant in stress.strengths.items())
     note = (
-        f"%; {count} held-out demonstrations, {seeds} seed{'s' if seeds > 1 else ''}, every rollout counted, from "
+        f"%; {count} {PART_WORDS[stress.part]}, {seeds} seed{'s' if seeds > 1 else ''}, every rollout counted, from "
         "frame 0; neither is told of the disturbance. First the share that is never lost (CHORD) and still held, with "
         "its 95 % interval (Wilson). Constant press: the better in each row of those that searches on the training "
         f"demonstrations found, as recorded and disturbed as in training: {strengths}"
@@ -64,7 +64,7 @@ def write_stress(stress: Stress, folder: Path) -> None:
         }
         for row, policies in stress.policies.items()
     }
-    content = {"schema": SCHEMA, "constant_press": dict(stress.strengths), "rows": rows}
+    content = {"schema": SCHEMA, "part": stress.part, "constant_press": dict(stress.strengths), "rows": rows}
     with replacing(folder / "stress.json") as temporary:
         temporary.write_text(json.dumps(content, indent=1) + "\n")
     with replacing(folder / "stress.csv") as temporary, temporary.open("w", newline="") as file:

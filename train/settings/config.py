@@ -14,6 +14,7 @@ from hydra.core.config_store import ConfigStore
 from omegaconf import DictConfig, ListConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from envs.demonstrations.load_set import PARTS, SEALED
 from envs.demonstrations.set_settings import SetSettings
 from envs.disturbances.randomize import Randomize
 from envs.physics import ENGINES
@@ -45,6 +46,7 @@ class Config:
         out: folder for checkpoints, logs and results.
         demonstrations: folder below which demonstration sets are kept.
         checkpoint: what to evaluate or play; empty for the best of `out`.
+        part: of the demonstrations that evaluations are of: heldout, sealed (what nothing is tuned on) or train.
         data: which demonstrations; `data.folder=PATH` alone for finished ones.
         task: what an episode is.
         randomize: what disturbs training's episodes.
@@ -67,6 +69,7 @@ class Config:
     out: str = "outputs/${name}/seed${seed}"
     demonstrations: str = "outputs/demonstrations"
     checkpoint: str = ""
+    part: str = "heldout"
     data: SetSettings = dataclasses.field(default_factory=lambda: SetSettings(grasp="pinch"))
     task: Task = dataclasses.field(default_factory=Task)
     randomize: Randomize = dataclasses.field(default_factory=Randomize)
@@ -84,6 +87,8 @@ class Config:
             raise InputError(f"engine is {self.engine!r}; valid: auto, {', '.join(ENGINES)}")
         if self.hand != HUMAN:
             load_robot(self.hand)
+        if self.part not in (*PARTS, SEALED):
+            raise InputError(f"part is {self.part!r}; valid: {', '.join((*PARTS, SEALED))}")
         if not self.out.strip():
             raise InputError("out is empty; give the folder to write to, such as out=outputs/pinch/seed0")
         for seed in (self.seed, *self.seeds):

@@ -7,11 +7,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from envs.demonstrations import dataset
-from envs.demonstrations.dataset import make_set
-from envs.demonstrations.load_set import PARTS, load_part
+from envs.demonstrations.dataset import make_sealed, make_set
+from envs.demonstrations.load_set import PARTS, load_demonstrations, load_part
 from envs.demonstrations.scripted.simulated_capture import CaptureSettings, load_truth
-from envs.demonstrations.set_settings import SetSettings, set_folder
+from envs.demonstrations.set_settings import SetSettings, sealed_folder, sealed_seed, set_folder
 from envs.demonstrations.twin_hands import twins
+from envs.grasps import grasp_names
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import load_demonstration, save_demonstration
 from mjx_hand.motion.motion import load_motion_file
@@ -145,3 +146,25 @@ def test_sets_of_nothing_are_refused(name):
 def test_an_unknown_grasp_is_refused_before_anything_is_made():
     with pytest.raises(InputError, match="grasp type 'fist' is not known"):
         SetSettings("fist")
+
+
+def test_the_sealed_part_is_of_other_people_and_stands_apart(set_path, tmp_path):
+    settings = dataclasses.replace(SETTINGS, sealed_people=2, sealed_trials=1)
+    folder = make_sealed(settings, tmp_path)
+    assert folder == sealed_folder(settings, tmp_path) != set_folder(settings, tmp_path)
+    assert set_folder(settings, tmp_path).name == set_path.name, "sets are the same whatever is sealed"
+    sealed = load_demonstrations(settings, "sealed", tmp_path)
+    assert len(sealed) == 2
+    shapes = [load_truth(path).shape for path in (*set_path.glob("*/*.truth.npz"), *folder.glob("*/*.truth.npz"))]
+    assert len({shape.tobytes() for shape in shapes}) == SETTINGS.people + SETTINGS.heldout_people + 2
+    sizes = [d.object.size[0] for d in (*load_part(set_path, "train"), *load_part(set_path, "heldout"), *sealed)]
+    assert len(set(sizes)) == len(sizes)
+    with pytest.raises(InputError, match=r"config=pinch part=sealed"):
+        load_demonstrations(dataclasses.replace(settings, sealed_trials=2), "sealed", tmp_path)
+    with pytest.raises(InputError, match="have no sealed part"):
+        sealed_folder(SetSettings("given", folder="here"), tmp_path)
+
+
+def test_every_type_draws_its_sealed_part_by_itself():
+    seeds = [sealed_seed(SetSettings(grasp, seed=seed)) for grasp in grasp_names() for seed in (0, 1)]
+    assert len(set(seeds)) == len(seeds)
