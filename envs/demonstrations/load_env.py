@@ -65,8 +65,9 @@ def env_of_set(
         InputError: as `load`.
     """
     demonstrations = load_demonstrations(settings, part, root)
+    people = twins(demonstrations)
     if hand == HUMAN:
-        return TrackingEnv(demonstrations, twins(demonstrations), engine, task, randomize=randomize)
+        return TrackingEnv(demonstrations, people, engine, task, randomize=randomize)
     body = robot_body(hand)
-    brought = robot_demonstrations(demonstrations, body)
+    brought = robot_demonstrations(demonstrations, people, body)
     return TrackingEnv(brought, [body] * len(brought), engine, task, randomize=randomize)

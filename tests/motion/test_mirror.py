@@ -96,6 +96,9 @@ def test_hinges_of_the_person_are_mirrored_too(falling):
     rest = Rotation.from_rotvec(rng.normal(scale=0.1, size=(15, 3))).as_matrix()
     own = dataclasses.replace(falling, hinge_axis=axes / np.linalg.norm(axes, axis=1)[:, None], rest_rotation=rest)
     other = mirrored_demonstration(own)
+    assert own.hinge_axis is not None
+    assert other.hinge_axis is not None
+    assert other.rest_rotation is not None
     for k in (0, 7, 19):
         turn = Rotation.from_rotvec(0.3 * own.hinge_axis[k]).as_matrix()
         mirrored = Rotation.from_rotvec(0.3 * other.hinge_axis[k]).as_matrix()

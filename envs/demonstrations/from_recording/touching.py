@@ -119,7 +119,9 @@ def _solved(
 
 @jax.jit
 def _gaps(angles: Array, rotation: Array, position: Array, hand: RigidHand, planes: Array) -> Float[Array, "n c"]:
-    return jax.lax.map(lambda row: capsule_gaps(*row, hand, planes), (angles, rotation, position), batch_size=8)
+    return jax.lax.map(
+        lambda row: capsule_gaps(row[0], row[1], row[2], hand, planes), (angles, rotation, position), batch_size=8
+    )
 
 
 @jax.jit
@@ -137,7 +139,7 @@ def _solve(
 
         def residual(x: Array) -> tuple[Array, Array]:
             q, r, p = placed(x)
-            gaps = _linear_gaps(capsule_axes(q, r, p, hand), hand.capsule_radius, planes)
+            gaps = _linear_gaps(capsule_axes(q, r, p, hand), jnp.asarray(hand.capsule_radius), planes)
             outside = jnp.maximum(q - hand.hinge_upper, 0) + jnp.maximum(hand.hinge_lower - q, 0)
             free = jnp.zeros_like(gaps).at[tips].set(share)
             rows = jnp.concatenate(

@@ -76,8 +76,7 @@ def solid_of(recorded: RecordedObject, where: str) -> Solid:
 
 def samples(solid: Solid) -> Float[np.ndarray, "n 3"]:
     """Points of the surface, nowhere further apart than some millimetres."""
-    points, _ = trimesh.remesh.subdivide_to_size(solid.vertices, solid.faces, _SPACING, max_iter=20)
-    return points
+    return np.asarray(trimesh.remesh.subdivide_to_size(solid.vertices, solid.faces, _SPACING, max_iter=20)[0])
 
 
 def pieces_of(solid: Solid, most: int) -> Float[np.ndarray, "h c 3"]:

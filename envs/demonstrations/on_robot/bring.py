@@ -37,6 +37,7 @@ _DEPTH = 0.002  # m that a link may be inside the object
 _OFF = 0.004  # m that a finger may be off the surface where it should touch
 _CLEAR = 0.001  # m, beyond which another link is not inside
 _STEPS, _FEW = 60, 6
+_ANYWHERE = 0.3  # m: no link of a hand at an object is farther
 
 
 @dataclasses.dataclass(frozen=True)
@@ -116,6 +117,10 @@ class _Bringing:
     def _place(self, targets: np.ndarray, frame: int) -> None:
         self.touch.place(hand_coordinates(self.model, targets), self.demonstration.object_pose[frame])
 
+    def _near(self) -> dict[int, tuple[float, np.ndarray, np.ndarray]]:
+        """Of every link its gap, its point nearest to the object, and the way in, where they are now."""
+        return {number: (gap, point, way) for number, gap, point, way in self.touch.nearest(_ANYWHERE)}
+
     def _jacobian(self, link: int, point: np.ndarray) -> Float[np.ndarray, "3 u"]:
         return self.touch.jacobian(link, point) @ self.mix
 
@@ -128,7 +133,7 @@ class _Bringing:
 
         def equations(targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             self._place(targets, frame)
-            near = {number: rest for number, *rest in self.touch.nearest(0.3)}
+            near = self._near()
             rows, values = [], []
             for link, place, inward in zip(wanted, places, pads.inward, strict=True):
                 gap, point, way = near[link]
@@ -165,7 +170,7 @@ class _Bringing:
         assert best is not None
         targets = best[1]
         self._place(targets, frame)
-        near = {number: rest for number, *rest in self.touch.nearest(0.3)}
+        near = self._near()
         off = np.array([np.linalg.norm(near[k][1] - place) for k, place in zip(wanted, places, strict=True)])
         gap = np.array([near[k][0] for k in wanted])
         depth = max(0.0, -min(rest[0] for rest in near.values()))
@@ -175,7 +180,7 @@ class _Bringing:
         """Targets of every frame, from the grasp on and from it back."""
         frame, pads = self.pads.grasp, self.pads
         self._place(grasp, frame)
-        near = {number: rest for number, *rest in self.touch.nearest(0.3)}
+        near = self._near()
         wanted = [self.last[finger] for finger in pads.fingers]
         data, bodies = self.touch.data, [self.model.body(self.touch.links[k]).id for k in wanted]
         local = [

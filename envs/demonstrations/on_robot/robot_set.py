@@ -6,7 +6,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from envs.demonstrations.on_robot.bring import on_robot
-from envs.demonstrations.twin_hands import twins
 from mjx_hand.bodies.body import Body
 from mjx_hand.bodies.body_places import body_model
 from mjx_hand.errors import InputError
@@ -15,12 +14,20 @@ from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.motion.joint_motion import JointMotion
 from mjx_hand.progress import counter
 from mjx_hand.pytree import replace
+from mjx_hand.rigid.rigid_hand import RigidHand
 
 _MOTION = ("angles", "wrist_position", "wrist_quaternion")
 
 
-def robot_demonstrations(demonstrations: Sequence[Demonstration], body: Body) -> list[Demonstration]:
+def robot_demonstrations(
+    demonstrations: Sequence[Demonstration], people: Sequence[RigidHand], body: Body
+) -> list[Demonstration]:
     """The demonstrations on a robot hand; those that it cannot do are left out, and said with the reason.
+
+    Args:
+        demonstrations: of people.
+        people: the twin's hand for each.
+        body: the robot's.
 
     Raises:
         InputError: it can do none of them.
@@ -29,7 +36,7 @@ def robot_demonstrations(demonstrations: Sequence[Demonstration], body: Body) ->
     def compute() -> dict[str, np.ndarray]:
         arrays: dict[str, np.ndarray] = {}
         with counter(len(demonstrations), f"demonstrations on {body.name}") as advance:
-            for k, (d, person) in enumerate(zip(demonstrations, twins(demonstrations), strict=True)):
+            for k, (d, person) in enumerate(zip(demonstrations, people, strict=True)):
                 try:
                     motion = on_robot(d, person, body).demonstration.motion
                     arrays |= {f"{name}.{k}": getattr(motion, name) for name in _MOTION}
@@ -49,9 +56,12 @@ def robot_demonstrations(demonstrations: Sequence[Demonstration], body: Body) ->
     made = []
     for k, d in enumerate(demonstrations):
         if k not in refused:
+            angles, position, quaternion = (np.asarray(arrays[f"{name}.{k}"]) for name in _MOTION)
             motion = JointMotion(
                 fps=d.motion.fps,
-                **{name: np.asarray(arrays[f"{name}.{k}"]) for name in _MOTION},
+                angles=angles,
+                wrist_position=position,
+                wrist_quaternion=quaternion,
                 valid=np.ones(d.num_frames, bool),
                 side=body.side,
                 source=f"{d.motion.source} on {body.name}",

@@ -52,8 +52,9 @@ def test_the_pads_are_those_of_the_pinch(demonstrations, hands):
     assert (np.sum(towards * pads.inward, axis=1) > 0.5).all()
 
 
-def test_fingers_touch_where_the_persons_do(brought, demonstrations, allegro):
-    """By MuJoCo's distances in the robot's own scene, while the object is carried: on the surface, and not inside."""
+def test_fingers_touch_where_the_persons_do(brought, demonstrations, hands, allegro):
+    """By MuJoCo's distances in the robot's own scene: on the surface at the grasp, and while the object is carried as
+    near to it as the recording of a person's finger is, which comes off and sinks in by millimetres."""
     assert brought.fingers == FINGERS
     assert brought.off.max() < 0.012
     assert brought.depth < 0.002
@@ -61,14 +62,16 @@ def test_fingers_touch_where_the_persons_do(brought, demonstrations, allegro):
     model = demonstration_model(d, allegro)
     data, targets = mujoco.MjData(model), demonstrated_targets(d)
     thing = [g for g in range(model.ngeom) if model.geom_bodyid[g] == model.body(OBJECT).id]
-    high = np.flatnonzero(d.object_pose[:, 2] - d.object_pose[0, 2] > 0.03)
-    for frame in high[:: max(len(high) // 5, 1)]:
+    lifted = np.flatnonzero(d.object_pose[:, 2] - d.object_pose[0, 2] > 0.03)
+    grasp = demonstrated_pads(demonstrations[0], hands[0]).grasp
+    for frame in [grasp, *lifted[:: max(len(lifted) // 5, 1)]]:
         data.qpos[:] = np.concatenate([targets[frame], d.object_pose[frame]])
         mujoco.mj_kinematics(model, data)
         for finger in FINGERS:
             geoms = [model.geom(c.name).id for c in allegro.contacts if c.finger == finger]
             gap = min(mujoco.mj_geomDistance(model, data, a, b, 0.1, None) for a in geoms for b in thing)
-            assert -0.003 < gap < 0.004, (frame, finger)
+            low, high = (-0.002, 0.001) if frame == grasp else (-0.008, 0.008)
+            assert low < gap < high, (frame, finger)
     np.testing.assert_array_equal(d.object_pose, demonstrations[0].object_pose)
 
 

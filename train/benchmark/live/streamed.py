@@ -60,7 +60,7 @@ def report(options: Options) -> list[str]:
     means = []
     for folder in options.sets:
         shown = load_part(folder, "heldout")[: options.count]
-        shares = [np.mean([is_held(d, assist, seed) for seed, d in enumerate(shown)]) for assist in ASSISTS]
+        shares = [float(np.mean([is_held(d, a, seed) for seed, d in enumerate(shown)])) for a in ASSISTS]
         means.append(shares)
         lines.append(_row(f"{shown[0].grasp} ({len(shown)})", shares))
     return [*lines, _row("mean", np.mean(means, axis=0))]

@@ -1,5 +1,7 @@
 """Made-up recordings of a flat hand and a box of which everything is known: who moves it when, and where it rests."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -36,7 +38,7 @@ def motion(position: np.ndarray, side: str = "right", shape: int = 10) -> Motion
     )
 
 
-def way(times: np.ndarray, steps: list[tuple[float, float, np.ndarray]]) -> np.ndarray:
+def way(times: np.ndarray, steps: Sequence[tuple[float, float, Sequence[float]]]) -> np.ndarray:
     """Of points: from the origin on by each step's vector, between its times."""
     return sum((smooth(times, a, b)[:, None] * np.asarray(by, float) for a, b, by in steps), np.zeros((len(times), 3)))
 

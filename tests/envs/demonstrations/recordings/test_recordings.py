@@ -145,6 +145,7 @@ def test_a_folder_stands_for_all_recordings_below_it(folder, tmp_path):
         SetSettings("recorded")
 
 
+@pytest.mark.slow
 def test_a_folder_of_captures_becomes_a_set_with_a_page_each(folder, set_path, tmp_path):
     settings = SetSettings("recorded", recording=RecordingSettings(path=str(folder), train=4, heldout=3, mass=0.2))
     made = make_set(settings, tmp_path)
