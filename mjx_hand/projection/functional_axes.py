@@ -140,6 +140,7 @@ def _fit(
             found = residuals(free)
             return found, found
 
+        # A loop of its own: residuals are weighted anew in each step, and thousands of frames share one axis.
         def iterate(_: Array, state: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
             free, value, damping = state
             (off_slope, moved_slope), (off, moved) = jax.jacfwd(linearised, has_aux=True)(free)

@@ -82,6 +82,7 @@ def _refine(
     chains: FingerChains,
     weights: RefineWeights,
 ) -> Float[Array, "*b 5 4"]:
+    # A loop of its own: four unknowns within limits, millions of systems at once, solved without a call for each.
     start = jnp.clip(angles, chains.lower, chains.upper)
     sizes = jnp.array([weights.joint, weights.joint, 1.0], start.dtype)[:, None]
 

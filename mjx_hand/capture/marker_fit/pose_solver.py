@@ -117,6 +117,7 @@ def solve_poses(points: SkinnedPoints, frames: Frames, state: PoseState, iterati
 
     A frame whose energy a step does not lower stays where it is and is damped more.
     """
+    # A loop of its own: its matrix is solved in blocks, a finger each, and its weights change with the residuals.
 
     count = frames.observed.shape[0]
 

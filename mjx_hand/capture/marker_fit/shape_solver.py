@@ -145,6 +145,7 @@ def solve_subject(
         offset_deviation: standard deviation of each component of a marker's offset, m.
         iterations: number of steps.
     """
+    # A loop of its own: poses of all frames are eliminated before what they share is solved for.
     num_shape = subject.shape.shape[0]
     prior = jnp.concatenate([jnp.full(num_shape, shape_deviation**-2), jnp.repeat(offset_deviation**-2, 3)])
     expected = flat(subject)

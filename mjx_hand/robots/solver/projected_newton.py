@@ -3,7 +3,9 @@
 A projected Newton method (Bertsekas, SIAM J. Control Optim. 20(2), 1982, https://doi.org/10.1137/0320018) with
 Marquardt's damping: degrees of freedom that stand at a limit and are pulled outwards rest, the others take a Newton
 step and are clipped to their limits. A frame whose objective a step does not lower goes back and tries a shorter one.
-Each iteration looks at one place only, which serves the test of the step before and the next step.
+Each iteration looks at one place only, which serves the test of the step before and the next step. It shares no loop
+with other solvers here: the batch stands last, the matrix is a dictionary of the entries that a hand's tree has, and
+neighbouring frames hold each other.
 """
 
 import jax
