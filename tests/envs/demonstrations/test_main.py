@@ -50,7 +50,7 @@ def test_settings_come_from_the_experiment_and_its_overrides():
     [
         ([], r"config is ''; give config=NAME, one of .*pinch.*power"),
         (["config=fist"], "config is 'fist'"),
-        (["config=pinch", "seed=3"], "'seed' is not an option; valid: config, demonstrations, data"),
+        (["config=pinch", "seed=3"], "'seed' is not an option; valid: config, demonstrations, part=sealed, data"),
         (["config=pinch", "data.persons=3"], "Key 'persons' not in 'SetSettings'"),
         (["config=pinch", "data.people=many"], "'many'.*could not be converted"),
         (["config=pinch", "data.people=0"], "data.people is 0"),
