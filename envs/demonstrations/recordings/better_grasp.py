@@ -24,7 +24,7 @@ from mjx_hand.motion.resample import matrix_quaternions
 from mjx_hand.objects.primitives import hull_planes
 from mjx_hand.pytree import replace
 
-_FORCE = 4.0  # of `grip_force_of`: what the grasp that is searched for must hold with
+_FORCE = 4.5  # of `grip_force_of`: what the grasp that is searched for must hold with
 _ARRIVING = (0.45, 0.1)  # s before the lift: where the hand is at the object and has not moved it
 _EARLIEST = 1.5  # s before the lift that the approach takes
 
