@@ -46,7 +46,7 @@ class JointMotion:
     side: str = static(default="right")
     source: str = static(default="")
     warnings: Lines = static(default=())
-    joint_names: tuple[str, ...] = static(default=HINGES)
+    joint_names: Lines = static(default=HINGES)
 
     @property
     def num_frames(self) -> int:

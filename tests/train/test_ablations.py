@@ -31,7 +31,10 @@ RESIDUAL_OFF, ALONE = (next(variant for variant in VARIANTS if variant.column ==
 
 def experiment(success: Sequence[float], folder: Path = Path("there"), zero: float = 0.25) -> Experiment:
     curves = {seed: curve(0.1, value) for seed, value in enumerate(success)}
-    return Experiment("spherical", folder, summary("spherical", success, zero), curves)
+    told = summary("spherical", success, zero)
+    for scores in (*told["scores"].values(), *told["seeds"].values()):
+        scores["manip_trans_object"] = scores["kept"]  # what ablations are told by
+    return Experiment("spherical", folder, told, curves)
 
 
 def test_the_plan_without_options_is_every_variant_at_one_budget():
