@@ -60,7 +60,11 @@ def headlines(policies: Sequence[Evaluation]) -> list[Headline]:
     """What the policies kept: never lost (CHORD), and held 5 s longer where there is something to hold."""
     bounds, scores = intervals(policies), mean_scores([e.rows() for e in policies])
     return [
-        Headline(title, f"{100 * scores[name]:.1f} %", f"{100 * bounds[name][0]:.0f} to {100 * bounds[name][1]:.0f} %")
+        Headline(
+            title,
+            f"{100 * scores[name]:.1f} %",
+            "95 % interval {:.0f} to {:.0f} %".format(*(100 * b for b in bounds[name])),
+        )
         for name, title in (("chord", "never lost (CHORD)"), ("hold", "held 5 s longer"))
         if name in scores
     ]
