@@ -66,12 +66,10 @@ class GraspRollout:
 
         @jax.jit
         def grips(angles: Array, rotation: Array, position: Array) -> Array:
-            def one(row: tuple[Array, Array, Array]) -> Array:
-                angles, *place = row
-                where = place[0], place[1]
-                return grip_offsets(angles, where, bare, description.kind, jnp.zeros(3), force, self.gains, planes)
-
-            return jax.lax.map(one, (angles, rotation, position), batch_size=8)
+            # All frames of all grasps as one sequence: a loop of loops can come to a standstill on few CPU cores.
+            rows, where = angles.reshape(-1, NUM_HINGES), (rotation.reshape(-1, 3, 3), position.reshape(-1, 3))
+            found = grip_offsets(rows, where, bare, description.kind, jnp.zeros(3), force, self.gains, planes)
+            return found.reshape(angles.shape)
 
         self._grips = grips
 
@@ -113,10 +111,11 @@ class GraspRollout:
         ]
         targets = np.concatenate([np.stack(turns), trajectory.angles], axis=2)
         until = act.closed + 1  # the grasp stays as it is from then on, and so does the grip
-        rows = (trajectory.angles[:, :until], *(part[:, :until] for part in trajectory.in_hand))
+        closing = slice(act.closing, until)  # open fingers press on nothing
+        rows = (trajectory.angles[:, closing], *(part[:, closing] for part in trajectory.in_hand))
         grip = np.asarray(self._grips(*(jnp.asarray(row, jnp.float32) for row in rows)), float)
         controls = np.array(anticipated(jnp.asarray(targets, jnp.float32), self.gains, self.fps), float)
-        controls[:, :until, NUM_WRIST:] += grip
+        controls[:, closing, NUM_WRIST:] += grip
         controls[:, until:, NUM_WRIST:] += grip[:, -1:]
         low, high = self.model.actuator_ctrlrange.T
         place = np.broadcast_to(trajectory.position, (*targets.shape[:2], 3))
