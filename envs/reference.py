@@ -77,8 +77,8 @@ def make_reference(
     frames = max(d.num_frames for d in demonstrations)
     targets, poses, bases = [], [], []
     for d in demonstrations:
-        targets.append(_padded(demonstrated_targets(d), frames))
-        poses.append(_padded(d.object_pose, frames))
+        targets.append(padded(demonstrated_targets(d), frames))
+        poses.append(padded(d.object_pose, frames))
         bases.append(base_rotation(d))
     targets = jnp.asarray(np.stack(targets), jnp.float32)
     grip = grip_table(demonstrations, hands, targets, np.where(forces > 0, forces, np.nan), gains)
@@ -132,7 +132,7 @@ def grip_table(
         bodies = [body_of(hand) for hand in hands]
         return jnp.asarray(model_grips(demonstrations, bodies, np.asarray(targets, float), forces, gains), jnp.float32)
     frames = targets.shape[1]
-    relative = [[_padded(rows, frames) for rows in object_in_hand(d)] for d in demonstrations]
+    relative = [[padded(rows, frames) for rows in object_in_hand(d)] for d in demonstrations]
     rotation = jnp.asarray(np.stack([r for r, _ in relative]), jnp.float32)
     position = jnp.asarray(np.stack([p for _, p in relative]), jnp.float32)
     grip = jnp.zeros_like(targets)
@@ -166,11 +166,11 @@ def _tips(
         rows = zip(demonstrations, bodies, told, strict=True)
         return np.stack([model_places(body, own)[1] @ base_rotation(d).T for d, body, own in rows])
     motions = [d.motion for d in demonstrations]
-    angles = jnp.asarray(np.stack([_padded(m.angles, frames) for m in motions]), jnp.float32)
+    angles = jnp.asarray(np.stack([padded(m.angles, frames) for m in motions]), jnp.float32)
     tips = np.asarray(jax.jit(jax.vmap(finger_tips))(angles, stack_hands(people)))
     turns = (Rotation.from_quat(m.wrist_quaternion, scalar_first=True).as_matrix() for m in motions)
-    wrist = np.stack([_padded(rotation, frames) for rotation in turns])
-    place = np.stack([_padded(m.wrist_position, frames) for m in motions])
+    wrist = np.stack([padded(rotation, frames) for rotation in turns])
+    place = np.stack([padded(m.wrist_position, frames) for m in motions])
     return np.einsum("dtij,dtfj->dtfi", wrist, tips) + place[:, :, None]
 
 
@@ -242,7 +242,8 @@ def _one_of_kinds(demonstration: Demonstration) -> list[float]:
     return [float(demonstration.object.kind == kind) for kind in OBJECT_KINDS]
 
 
-def _padded(rows: np.ndarray, frames: int) -> np.ndarray:
+def padded(rows: np.ndarray, frames: int) -> np.ndarray:
+    """The rows, the last of them held up to so many frames."""
     return np.concatenate([rows, np.repeat(rows[-1:], frames - len(rows), axis=0)])
 
 

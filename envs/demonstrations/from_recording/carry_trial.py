@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from envs.grip_force import grip_force_of
 from envs.physics.solver import gauss_seidel
-from envs.reference import anticipated, grip_table
-from envs.scene import NUM_WRIST, TIMESTEP, base_rotation, demonstration_models, wrist_coordinates
+from envs.reference import anticipated, demonstrated_targets, grip_table, padded
+from envs.scene import NUM_WRIST, TIMESTEP, demonstration_models
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.rigid.gains import Gains
@@ -35,12 +35,12 @@ def carry_trial(
     gains = Gains()
     frames = -(-max(d.num_frames for d in demonstrations) // _BLOCK) * _BLOCK
     trials = [(d, hand, share) for d, hand in zip(demonstrations, hands, strict=True) for share in SHARES]
-    targets = np.stack([_padded(_targets(d), frames) for d, _, _ in trials])
+    targets = np.stack([padded(demonstrated_targets(d), frames) for d, _, _ in trials])
     forces = np.array([grip_force_of(d.object.mass, d.object.friction, share) for d, _, share in trials])
     told = jnp.asarray(targets, jnp.float32)
     grip = grip_table([d for d, _, _ in trials], [hand for _, hand, _ in trials], told, forces, gains)
     controls = np.asarray(anticipated(told, gains, demonstrations[0].motion.fps) + grip, float)
-    poses = np.stack([_padded(d.object_pose, frames) for d, _, _ in trials])
+    poses = np.stack([padded(d.object_pose, frames) for d, _, _ in trials])
     beside = _BESIDE * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
     models = gauss_seidel(demonstration_models(demonstrations, hands, gains=gains))
     models = [model for model in models for _ in SHARES]
@@ -81,12 +81,3 @@ def _first_lost(
         if (gone | (frame >= lengths)).all():
             break
     return lost
-
-
-def _targets(d: Demonstration) -> Float[np.ndarray, "t 26"]:
-    wrist = wrist_coordinates(d.motion.wrist_position, d.motion.wrist_quaternion, base_rotation(d))
-    return np.concatenate([wrist, d.motion.angles], axis=1)
-
-
-def _padded(rows: np.ndarray, frames: int) -> np.ndarray:
-    return np.concatenate([rows, np.repeat(rows[-1:], frames - len(rows), axis=0)])

@@ -5,15 +5,13 @@ ones are solved by damped Gauss-Newton steps: gaps of the fingers that touch, de
 recorded. What changes over time is low-pass filtered; a second, stiffer solution then clears what the filter let in.
 """
 
-import dataclasses
-
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 from scipy.ndimage import median_filter
 
-from envs.demonstrations.from_recording.grasp_pose import capsule_axes, capsule_gaps, last_phalanges
+from envs.demonstrations.from_recording.grasp_pose import GraspPose, capsule_axes, capsule_gaps, last_phalanges
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.motion.resample import matrix_quaternions, quaternion_matrices
 from mjx_hand.motion.smooth import smooth_rows
@@ -29,21 +27,7 @@ _SECOND = (0.002, 0.0003, 0.02, 0.05, 0.003, 0.02)
 _CLEARANCE = 0.0003  # m that the first solution keeps off where nothing touches, for the filter
 
 
-@dataclasses.dataclass(frozen=True)
-class HandOnObject:
-    """A hand and the object in its wrist's frame, t frames.
-
-    Attributes:
-        angles: hinge angles (rad).
-        rotation, position: the object in the wrist's frame (m).
-    """
-
-    angles: Float[np.ndarray, "t 20"]
-    rotation: Float[np.ndarray, "t 3 3"]
-    position: Float[np.ndarray, "t 3"]
-
-
-def gaps_over_time(held: HandOnObject, hand: RigidHand, planes: Float[np.ndarray, "h f 4"]) -> Float[np.ndarray, "t c"]:
+def gaps_over_time(held: GraspPose, hand: RigidHand, planes: Float[np.ndarray, "h f 4"]) -> Float[np.ndarray, "t c"]:
     """Distance (m) of each of the hand's capsules from the object in each frame; negative inside."""
     bare, table = on_device(hand), jnp.asarray(_padded_planes(planes), jnp.float32)
     parts = [_gaps(*part, bare, table) for part in _chunks(held.angles, held.rotation, held.position)]
@@ -72,13 +56,13 @@ def touching_shares(
 
 
 def corrected(
-    held: HandOnObject,
+    held: GraspPose,
     shares: Float[np.ndarray, "t 5"],
     hand: RigidHand,
     planes: Float[np.ndarray, "h f 4"],
     fps: float,
     cutoff: float,
-) -> HandOnObject:
+) -> GraspPose:
     """The posture nearest to the recorded one in which tips that are to touch do, and nothing is in the object.
 
     Args:
@@ -94,7 +78,7 @@ def corrected(
     change = np.concatenate([first.angles - held.angles, first.position - held.position], axis=1)
     change = smooth_rows(change, fps, cutoff)
     quaternion = smooth_rows(matrix_quaternions(first.rotation), fps, cutoff)
-    smooth = HandOnObject(
+    smooth = GraspPose(
         angles=held.angles + change[:, :NUM_HINGES],
         rotation=quaternion_matrices(quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)),
         position=held.position + change[:, NUM_HINGES:],
@@ -103,18 +87,18 @@ def corrected(
 
 
 def _solved(
-    held: HandOnObject,
+    held: GraspPose,
     shares: Float[np.ndarray, "t 5"],
     hand: RigidHand,
     planes: Array,
     scales: tuple[float, ...],
     clearance: float,
-) -> HandOnObject:
+) -> GraspPose:
     worth = jnp.asarray([*scales, clearance], jnp.float32)
     parts = [_solve(*part, hand, planes, worth) for part in _chunks(held.angles, held.rotation, held.position, shares)]
     rows = [np.concatenate([np.asarray(part[k], float) for part in parts])[: len(shares)] for k in range(3)]
     rotation = quaternion_matrices(matrix_quaternions(rows[1]))
-    return HandOnObject(np.clip(rows[0], hand.hinge_lower, hand.hinge_upper), rotation, rows[2])
+    return GraspPose(np.clip(rows[0], hand.hinge_lower, hand.hinge_upper), rotation, rows[2])
 
 
 @jax.jit

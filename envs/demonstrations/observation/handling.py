@@ -3,19 +3,17 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.ndimage import minimum_filter1d
 from scipy.spatial import KDTree
 
 from envs.demonstrations.observation.stillness import ObjectPath, spans
-from mjx_hand.capture.keypoints.layouts import hand_keypoints
 from mjx_hand.capture.keypoints.skeleton import BONES
 from mjx_hand.motion.gaps import fill_lines
 from mjx_hand.motion.motion import Motion
-from mjx_hand.motion.resample import quaternion_matrices
-from mjx_hand.rigid.rigid_hand import RigidHand, chain, tip_positions
+from mjx_hand.rigid.rigid_hand import RigidHand
+from mjx_hand.robots.motion_keypoints import motion_keypoints
 
 RESTS, CARRIED, OTHER_HAND, UNTOUCHED, UNSEEN = range(5)
 REASONS = {
@@ -50,19 +48,16 @@ class Act:
 
 def hand_points(motion: Motion, rigid: RigidHand) -> Float[np.ndarray, "t 36 3"]:
     """Joints, tips and middles of bones in the scene's frame (m), gaps bridged."""
-    links = chain(jnp.asarray(motion.rotations, jnp.float32), jnp.asarray(rigid.link_offset, jnp.float32))
-    points = np.asarray(hand_keypoints(links[1], tip_positions(*links, rigid)), float)
-    bones = BONES.reshape(-1, 2)
+    points, bones = motion_keypoints(motion, rigid).positions, BONES.reshape(-1, 2)
     points = np.concatenate([points, (points[:, bones[:, 0]] + points[:, bones[:, 1]]) / 2], axis=1)
-    turned = np.einsum("tij,tkj->tki", quaternion_matrices(motion.wrist_quaternion), points)
-    return fill_lines(turned + motion.wrist_position[:, None], motion.valid)
+    return fill_lines(points, motion.valid)
 
 
 def distances(
     points: Float[np.ndarray, "t k 3"], path: ObjectPath, surface: Float[np.ndarray, "n 3"]
 ) -> Float[np.ndarray, "t"]:
     """How far (m) the nearest of a hand's points is from an object's surface."""
-    there = np.einsum("tji,tkj->tki", path.rotation, points - path.position[:, None])
+    there = _on_object(points, path)
     return KDTree(surface).query(there.reshape(-1, 3))[0].reshape(there.shape[:2]).min(axis=1)
 
 
@@ -140,9 +135,14 @@ def longest_act(
     return Act(begin, end, labels[begin:end], left)
 
 
+def _on_object(points: Float[np.ndarray, "t k 3"], path: ObjectPath) -> Float[np.ndarray, "t k 3"]:
+    """Points of the scene in the object's frame."""
+    return np.einsum("tji,tkj->tki", path.rotation, points - path.position[:, None])
+
+
 def _slip(path: ObjectPath, points: Float[np.ndarray, "t k 3"], fps: float) -> Float[np.ndarray, "t"]:
     """How fast (m/s) a hand's nearest points move along the object, over 0.3 s."""
-    there = np.einsum("tji,tkj->tki", path.rotation, points - path.position[:, None])
+    there = _on_object(points, path)
     half = max(round(_SLACK * fps), 1)
     frames = np.arange(len(there))
     before, after = np.maximum(frames - half, 0), np.minimum(frames + half, frames[-1])

@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 from envs.demonstrations.observation.gravity import estimate_up
 from envs.demonstrations.observation.handling import (
     AT_HAND,
-    CARRIED,
     Act,
     distances,
     hand_points,
@@ -153,8 +152,3 @@ def world_from_up(up: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
 def _turned(path: ObjectPath, world: Float[np.ndarray, "3 3"]) -> ObjectPath:
     rotation = Rotation.from_matrix(world @ path.rotation).as_matrix()
     return dataclasses.replace(path, position=path.position @ world.T, rotation=rotation)
-
-
-def carried_frames(handled: Handled) -> np.ndarray:
-    """Frames of the act in which the hand has the object."""
-    return np.flatnonzero(handled.act.labels == CARRIED)

@@ -138,6 +138,13 @@ def held_rotation(turned: Rotation) -> tuple[Rotation, Bool[np.ndarray, "n"]]:
     return mean, (mean.inv() * turned).magnitude() < _SAME
 
 
+def shortest_turn(before: Float[np.ndarray, "3"], after: Float[np.ndarray, "3"], share: float = 1.0) -> Rotation:
+    """The shortest turn from one unit vector onto another, or a share of it."""
+    turn = np.cross(before, after)
+    size = np.linalg.norm(turn)
+    return Rotation.from_rotvec(share * np.arctan2(size, before @ after) * turn / max(size, 1e-12))
+
+
 def _credible(path: ObjectPath, labels: Int[np.ndarray, "t"], hand: Float[np.ndarray, "t 3 3"]) -> np.ndarray:
     """Frames whose orientation may be right: all, but for jumps; of a noisy recording those in which the object lies
     in the hand as it mostly does while it is carried, for a grasp does not slip."""
@@ -191,11 +198,7 @@ def _flat(rotation: np.ndarray, up: np.ndarray, solid: Solid) -> tuple[np.ndarra
     axis = solid.stands[int(np.argmax(solid.stands @ up))]
     if axis @ up < np.cos(_LEANS) * np.linalg.norm(up):
         return rotation, None
-    tilted = rotation @ axis
-    turn = np.cross(tilted, _UP)
-    size = np.linalg.norm(turn)
-    angle = np.arctan2(size, tilted @ _UP)
-    return Rotation.from_rotvec(turn / max(size, 1e-12) * angle).as_matrix() @ rotation, axis
+    return shortest_turn(rotation @ axis, _UP).as_matrix() @ rotation, axis
 
 
 def _shares(rests: Sequence[Rest], frames: int, fps: float) -> list[np.ndarray]:

@@ -112,8 +112,7 @@ def with_foot(
     """
     reach = solid.outline @ stand
     lowest = reach.min()
-    x = np.cross(stand, np.eye(3)[np.argmin(np.abs(stand))])
-    axes = np.stack([x / np.linalg.norm(x), np.cross(stand, x) / np.linalg.norm(x)])
+    axes = _across(stand)
     turn = np.linspace(0, 2 * np.pi, _FOOT_CORNERS, endpoint=False)
     foot = solid.outline[reach < lowest + _FLAT]
     corners = foot[np.unique(np.argmax(foot @ axes.T @ np.stack([np.cos(turn), np.sin(turn)]), axis=0))]
@@ -143,6 +142,13 @@ def _mesh(recorded: RecordedObject) -> trimesh.Trimesh:
             return trimesh.Trimesh(recorded.vertices, recorded.faces)
 
 
+def _across(normal: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2 3"]:
+    """Two unit vectors at right angles to each other and to a unit vector."""
+    x = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(normal, x)])
+
+
 def _outline(vertices: Float[np.ndarray, "v 3"], count: int = _DIRECTIONS) -> Float[np.ndarray, "c 3"]:
     """Few of a mesh's vertices, the furthest in each of many directions."""
     turn = np.arange(count) * (np.pi * (3 - np.sqrt(5)))  # a Fibonacci sphere
@@ -166,9 +172,7 @@ def _stands(hull: ConvexHull, points: np.ndarray, centre: np.ndarray) -> tuple[n
         normal = hull.equations[k, :3]
         taken |= hull.equations[:, :3] @ normal > np.cos(_SAME)
         reach = points @ normal
-        x = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-        x /= np.linalg.norm(x)
-        plane = np.stack([x, np.cross(normal, x)], axis=1)
+        plane = _across(normal).T
         foot = points[reach > reach.max() - _FLAT] @ plane
         try:
             edge = ConvexHull(foot)

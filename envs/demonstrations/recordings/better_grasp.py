@@ -11,8 +11,8 @@ from envs.demonstrations.from_recording.grasp_pose import GraspPose, last_phalan
 from envs.demonstrations.from_recording.grasp_search import search_grasp
 from envs.demonstrations.from_recording.grasp_trajectory import Act, grasp_trajectory
 from envs.demonstrations.from_recording.observed import ObservedSequence
-from envs.demonstrations.from_recording.touching import HandOnObject, gaps_over_time
-from envs.demonstrations.observation.settled_path import held_rotation
+from envs.demonstrations.from_recording.touching import gaps_over_time
+from envs.demonstrations.observation.settled_path import held_rotation, shortest_turn
 from envs.demonstrations.observation.stillness import spans
 from envs.demonstrations.recordings.recorded_demonstration import Figures, Recorded
 from envs.demonstrations.recordings.recording_settings import RecordingSettings
@@ -88,7 +88,7 @@ def _measured(
     observed, end = recorded.observed, made.num_frames
     into = np.swapaxes(wrist, 1, 2)
     offset = made.object_pose[:, :3] - made.motion.wrist_position
-    lies = HandOnObject(made.motion.angles, into @ rotation, np.einsum("tij,tj->ti", into, offset))
+    lies = GraspPose(made.motion.angles, into @ rotation, np.einsum("tij,tj->ti", into, offset))
     gaps = gaps_over_time(lies, observed.hand, hull_planes(made.object.hulls))
     moved = np.linalg.norm(made.motion.wrist_position - observed.recorded_hand[:end], axis=1)
     turned = Rotation.from_matrix(np.swapaxes(observed.sequence.hand_rotation[:end], 1, 2) @ wrist).magnitude()
@@ -127,10 +127,7 @@ def _held(observed: ObservedSequence, lifted: int) -> GraspPose:
     times = observed.times[lifted] - observed.times
     arriving = observed.hand_rotation[(times < _ARRIVING[0]) & (times > _ARRIVING[1]), 2].mean(axis=0)
     arriving /= np.linalg.norm(arriving)
-    axis = mean.apply([0.0, 0.0, 1.0])
-    turn = np.cross(axis, arriving)
-    angle = np.arctan2(np.linalg.norm(turn), axis @ arriving)
-    half = Rotation.from_rotvec(turn / max(np.linalg.norm(turn), 1e-9) * angle / 2)
+    half = shortest_turn(mean.apply([0.0, 0.0, 1.0]), arriving, share=0.5)
     return GraspPose(
         angles=np.median(observed.angles[lifted:][near], axis=0),
         rotation=(half * mean).as_matrix(),

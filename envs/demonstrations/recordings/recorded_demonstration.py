@@ -13,9 +13,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from envs.demonstrations.from_recording.grasp_pose import last_phalanges
+from envs.demonstrations.from_recording.grasp_pose import GraspPose, last_phalanges
 from envs.demonstrations.from_recording.touching import (
-    HandOnObject,
     corrected,
     gaps_over_time,
     touching_shares,
@@ -130,7 +129,7 @@ def _demonstration(
 ) -> tuple[Demonstration, Figures]:
     sequence, hand = observed.sequence, observed.hand
     into = np.swapaxes(sequence.hand_rotation, 1, 2)
-    lies = HandOnObject(
+    lies = GraspPose(
         angles=np.clip(sequence.angles, hand.hinge_lower, hand.hinge_upper),
         rotation=into @ sequence.rotation,
         position=np.einsum("tij,tj->ti", into, sequence.position - sequence.hand_position),
@@ -189,7 +188,7 @@ def _demonstration(
 
 
 def _motion(
-    held: HandOnObject, rotation: np.ndarray, position: np.ndarray, side: str, source: str, times: np.ndarray
+    held: GraspPose, rotation: np.ndarray, position: np.ndarray, side: str, source: str, times: np.ndarray
 ) -> tuple[JointMotion, np.ndarray]:
     wrist = rotation @ np.swapaxes(held.rotation, 1, 2)
     quaternion = matrix_quaternions(wrist)

@@ -16,7 +16,6 @@ from mjx_hand.files.safe_yaml import shown
 COLLISIONS = ("hulls", "capsules")
 _THICK, _SHORT = 0.008, 0.006  # m: the radius of a capsule along a bone, and a bone that needs none
 _SAMPLES = 2000  # points of a surface, by which shapes are compared
-_CORNERS = 48  # of a convex hull
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from envs.demonstrations.from_recording.grasp_pose import capsule_gaps, last_phalanges
-from envs.demonstrations.from_recording.touching import DEPTH, HandOnObject, corrected, gaps_over_time, touching_shares
+from envs.demonstrations.from_recording.grasp_pose import GraspPose, capsule_gaps, last_phalanges
+from envs.demonstrations.from_recording.touching import DEPTH, GraspPose, corrected, gaps_over_time, touching_shares
 from envs.demonstrations.scripted.grasp_posture import solve_postures
 from envs.grasps import grasp_type
 from mjx_hand.hand.joints import FINGERS
@@ -34,7 +34,7 @@ def pinch():
 def test_tips_that_touch_lie_on_the_surface_and_nothing_is_inside(pinch):
     hand, planes, angles, rotation, position = pinch
     off = np.stack([angles + 0.08 * np.sin(np.arange(20) + k / 20) for k in range(FRAMES)])
-    lies = HandOnObject(off, np.tile(rotation, (FRAMES, 1, 1)), np.tile(position + 0.003, (FRAMES, 1)))
+    lies = GraspPose(off, np.tile(rotation, (FRAMES, 1, 1)), np.tile(position + 0.003, (FRAMES, 1)))
     before = gaps_over_time(lies, hand, planes)
     one = capsule_gaps(off[7], rotation, position + 0.003, hand, planes)
     np.testing.assert_allclose(before[7], np.asarray(one), atol=1e-5)
@@ -54,7 +54,7 @@ def test_tips_that_touch_lie_on_the_surface_and_nothing_is_inside(pinch):
 
 def test_a_hand_that_is_away_stays_as_it_was(pinch):
     hand, planes, angles, rotation, position = pinch
-    lies = HandOnObject(
+    lies = GraspPose(
         np.tile(angles, (8, 1)), np.tile(rotation, (8, 1, 1)), np.tile(position - np.array([0, 0.3, 0]), (8, 1))
     )
     held = corrected(lies, np.zeros((8, 5)), hand, planes, FPS, 6.0)
