@@ -7,13 +7,13 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import expit
 
-from envs.scene import NUM_WRIST, OBJECT, demonstration_model
+from envs.scene import NUM_WRIST, OBJECT, demonstration_spec
 from mjx_hand.bodies.body import Body
 from mjx_hand.bodies.coordinates import coordinates_per_target, hand_coordinates
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.rigid.gains import Gains
 
-_NEAR = 0.007  # m: a link nearer than this is taken to touch
+NEAR = 0.007  # m: a link nearer than this is taken to touch
 _SHARP = 0.001  # m, over which that fades
 _FAR = 0.02  # m, beyond which nobody asks how far
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
@@ -61,6 +61,16 @@ class Touch:
         mujoco.mj_jac(self.model, self.data, jacobian, None, point, self._bodies[number])
         return jacobian[:, : self.model.nv - 6]
 
+    def on_link(self, number: int, point: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+        """A point (m, world) in a link's own axes, where the link is now."""
+        body = self._bodies[number]
+        return self.data.xmat[body].reshape(3, 3).T @ (point - self.data.xpos[body])
+
+    def in_world(self, number: int, place: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+        """The reverse of `on_link`."""
+        body = self._bodies[number]
+        return self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ place
+
 
 def model_grips(
     demonstrations: Sequence[Demonstration],
@@ -78,7 +88,7 @@ def model_grips(
     for k, (d, body) in enumerate(zip(demonstrations, bodies, strict=True)):
         if np.isnan(forces[k]):
             continue
-        model = demonstration_model(d, body)
+        model = demonstration_spec(d, body).compile()
         touch, mix = Touch(model, body), coordinates_per_target(model, targets.shape[-1])[:, NUM_WRIST:]
         coordinates = hand_coordinates(model, targets[k])
         opposing = np.isin(touch.fingers, body.opposing)
@@ -98,7 +108,7 @@ def _offsets(
         return np.zeros(mix.shape[1])
     numbers = np.array([number for number, *_ in found])
     gaps = np.array([gap for _, gap, *_ in found])
-    touching = expit((_NEAR - gaps) / _SHARP)
+    touching = expit((NEAR - gaps) / _SHARP)
     rows = np.stack([inward @ touch.jacobian(number, point) @ mix for number, _, point, inward in found])
     fingers = np.array(touch.fingers)[numbers]
     names = list(dict.fromkeys(touch.fingers))

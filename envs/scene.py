@@ -161,20 +161,6 @@ def demonstration_spec(
     )
 
 
-def demonstration_model(
-    demonstration: Demonstration,
-    hand: RigidHand | Body,
-    *,
-    gains: Gains | None = None,
-    visual: bool = False,
-    spare: int = 0,
-    assisted: bool = False,
-) -> mujoco.MjModel:
-    """`demonstration_spec`, compiled."""
-    spec = demonstration_spec(demonstration, hand, gains=gains, visual=visual, spare=spare, assisted=assisted)
-    return spec.compile()
-
-
 def spare_boxes(demonstrations: Sequence[Demonstration]) -> list[int]:
     """How many boxes each scene of a set lacks to have as many as the one with most."""
     most = max(len(d.support) for d in demonstrations)
@@ -194,7 +180,7 @@ def demonstration_models(
     touch nothing.
     """
     return [
-        demonstration_model(d, hand, gains=gains, spare=spare, assisted=assisted)
+        demonstration_spec(d, hand, gains=gains, spare=spare, assisted=assisted).compile()
         for d, hand, spare in zip(demonstrations, hands, spare_boxes(demonstrations), strict=True)
     ]
 

@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from envs.demonstrations.dataset import make_missing_sealed, make_missing_sets
+from envs.demonstrations.dataset import make_missing_sets
 from envs.demonstrations.load_set import SEALED
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
@@ -90,9 +90,10 @@ def measure(configs: Sequence[Config]) -> Experiment:
     folder = shared_folder(configs)
     summary = cached_results(configs) if finished and not configs[0].fresh else None
     if summary is None:
-        make_missing_sets(configs[0].data, configs[0].demonstrations)
+        data, root = configs[0].data, configs[0].demonstrations
+        make_missing_sets(data, root)
         if configs[0].part == SEALED:
-            make_missing_sealed(configs[0].data, configs[0].demonstrations)
+            make_missing_sets(data, root, sealed=True)
         env = training_env(configs[0])
         for config in configs:
             train(config, env)

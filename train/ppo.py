@@ -16,7 +16,7 @@ import numpy as np
 from tensorboardX import SummaryWriter
 
 from envs.demonstrations.dataset import make_missing_sets
-from envs.evaluation.evaluate import evaluate
+from envs.evaluation.evaluate import evaluate_in
 from envs.evaluation.roll_out import make_roll_out
 from envs.parallel import ParallelEnv
 from envs.physics.engine import available_engine
@@ -196,8 +196,7 @@ class _Run:
     def _check(self, writer: SummaryWriter, params: Networks, steps: int) -> None:
         """All training demonstrations from frame 0; keeps the best policy, because curves are not monotone."""
         began = time.monotonic()
-        objects = [d.object for d in self.env.demonstrations]
-        scores = evaluate(self.roll_out(params.policy), objects, self.env.body.palm).rows()
+        scores = evaluate_in(self.env, self.roll_out(params.policy)).rows()
         point = Point(
             steps=steps,
             seconds=time.monotonic() - self.start,

@@ -15,7 +15,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from envs.demonstrations.load_set import PARTS, SEALED
+from envs.demonstrations.load_set import SEALED
 from envs.grasps import grasp_names
 from mjx_hand.errors import InputError
 from train.experiment.evaluate_seeds import shared_folder
@@ -25,7 +25,6 @@ from train.reports.results_table import FIVE, Experiment
 from train.settings.config import Config, compose_seeds
 
 FOLDER = "outputs/results"
-_, HELDOUT = PARTS
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -64,9 +63,9 @@ def plan(argv: Sequence[str]) -> tuple[list[list[Config]], Path]:
 
 
 def _part(config: Config) -> str:
-    """The part of an experiment's demonstrations that results are of: the sealed one where there is one."""
+    """The part of an experiment's demonstrations that results are of: the sealed one, if it has one."""
     sets = config.data.expand_types() or (config.data,)
-    return SEALED if all(single.grasp in grasp_names() for single in sets) else HELDOUT
+    return SEALED if all(single.grasp in grasp_names() for single in sets) else config.part
 
 
 if __name__ == "__main__":

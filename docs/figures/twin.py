@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from envs.scene import demonstration_model
+from envs.scene import demonstration_spec
 from mjx_hand.view.video.video import render_frames
 from train.experiment.evaluate_seeds import POLICY, evaluate_checkpoint
 from train.settings.config import compose
@@ -24,7 +24,7 @@ def main() -> None:
     index = int(np.argsort(scores)[len(scores) // 2])
     which = int(rollouts.demonstration[index])
     demonstration = results.env.demonstrations[which]
-    model = demonstration_model(demonstration, results.env.hands[which], visual=True)
+    model = demonstration_spec(demonstration, results.env.hands[which], visual=True).compile()
     frames = (np.array(MOMENTS) * (demonstration.num_frames - 1)).astype(int)
     targets = np.asarray(results.env.reference.targets)[which, frames]
     wanted = np.concatenate([targets, rollouts.object_reference[index, frames]], axis=1)

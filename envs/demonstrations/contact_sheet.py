@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import UInt8
 
-from envs.scene import base_rotation, demonstration_model, wrist_coordinates
+from envs.scene import base_rotation, demonstration_spec, wrist_coordinates
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.rigid.rigid_hand import RigidHand
 from mjx_hand.view.video.camera import Camera
@@ -35,7 +35,7 @@ def contact_sheet(
         wrist = wrist_coordinates(d.motion.wrist_position, d.motion.wrist_quaternion, base_rotation(d))
         qpos = np.concatenate([wrist, d.motion.angles, d.object_pose], axis=1)
         moments = (np.array(MOMENTS) * (d.num_frames - 1)).round().astype(int)
-        model = demonstration_model(d, hands[k], visual=True)
+        model = demonstration_spec(d, hands[k], visual=True).compile()
         camera = Camera(distance=0.5)
         strips.append(np.concatenate(list(render_frames(model, qpos[moments], camera, size=(size, size))), axis=1))
     return np.concatenate(strips)

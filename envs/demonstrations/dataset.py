@@ -41,34 +41,22 @@ AS_RECORDED, VARIED = "as recorded", "varied"  # what a set from a recording cou
 _APART = 1_000_003  # between the seeds of the parts
 _SHAPE_LIMIT = 2.0  # standard deviations
 
+Yields = Mapping[str, Mapping[str, int]]  # what came of the attempts of each part
 Report = Callable[[str, float], None]  # what is being done, and the share of it done
 
 
-def make_missing_sets(settings: SetSettings, root: str | Path) -> None:
-    """Make those sets that the settings stand for and that are not below `root`, and say so.
+def make_missing_sets(settings: SetSettings, root: str | Path, *, sealed: bool = False) -> None:
+    """Make those sets, or sealed parts, that the settings stand for and that are not below `root`, and say so.
 
     Raises:
-        InputError: as `make_set`.
+        InputError: as `make_set` or `make_sealed`.
     """
     for single in settings.expand_types():
-        _make_missing(set_folder(single, root), lambda report, single=single: make_set(single, root, report))
-
-
-def make_missing_sealed(settings: SetSettings, root: str | Path) -> None:
-    """Make those sealed parts that the settings stand for and that are not below `root`, and say so.
-
-    Raises:
-        InputError: as `make_sealed`.
-    """
-    for single in settings.expand_types():
-        _make_missing(sealed_folder(single, root), lambda report, single=single: make_sealed(single, root, report))
-
-
-def _make_missing(folder: Path, make: Callable[[Report], Path]) -> None:
-    if not folder.is_dir():
-        print(f"{folder} is missing: making the demonstrations", flush=True)
-        with shares() as report:
-            make(report)
+        folder = sealed_folder(single, root) if sealed else set_folder(single, root)
+        if not folder.is_dir():
+            print(f"{folder} is missing: making the demonstrations", flush=True)
+            with shares() as report:
+                (make_sealed if sealed else make_set)(single, root, report)
 
 
 def make_set(settings: SetSettings, root: str | Path, report: Report = lambda what, share: None) -> Path:
@@ -77,26 +65,22 @@ def make_set(settings: SetSettings, root: str | Path, report: Report = lambda wh
     Raises:
         InputError: the folder cannot be written, or the grasp fails too often.
     """
-    folder = set_folder(settings, root)
-    if folder.is_dir():
-        remove_abandoned(folder)
-        return folder
-    with working_folder(folder) as temporary:
+
+    def fill(temporary: Path) -> Yields:
         if settings.grasp == RECORDED:
-            yields = _make_variations(settings, temporary, report)
-        elif settings.side == "left":
+            return _make_variations(settings, temporary, report)
+        if settings.side == "left":
             right = dataclasses.replace(settings, side="right")
-            yields = _mirror(make_set(right, root, report), temporary, PARTS)
-        elif (usual := dataclasses.replace(settings, capture=settings.capture.projected_as_usual())) != settings:
-            yields = _project_again(settings, make_set(usual, root, report), temporary, report)
-        else:
-            parts = dict(zip(PARTS, (settings.people, settings.heldout_people), strict=True))
-            yields = {
-                part: _make_part(settings, people, settings.seed + offset * _APART, temporary / part, part, report)
-                for offset, (part, people) in enumerate(parts.items())
-            }
-        _finish(temporary, folder, settings, yields)
-    return folder
+            return _mirror(make_set(right, root, report), temporary, PARTS)
+        if (usual := dataclasses.replace(settings, capture=settings.capture.projected_as_usual())) != settings:
+            return _project_again(settings, make_set(usual, root, report), temporary, report)
+        parts = dict(zip(PARTS, (settings.people, settings.heldout_people), strict=True))
+        return {
+            part: _make_part(settings, people, settings.seed + offset * _APART, temporary / part, part, report)
+            for offset, (part, people) in enumerate(parts.items())
+        }
+
+    return _made(set_folder(settings, root), settings, fill)
 
 
 def make_sealed(settings: SetSettings, root: str | Path, report: Report = lambda what, share: None) -> Path:
@@ -105,33 +89,34 @@ def make_sealed(settings: SetSettings, root: str | Path, report: Report = lambda
     Raises:
         InputError: as `sealed_folder`, the folder cannot be written, or the grasp fails too often.
     """
-    folder = sealed_folder(settings, root)
+
+    def fill(temporary: Path) -> Yields:
+        if settings.side == "left":
+            right = make_sealed(dataclasses.replace(settings, side="right"), root, report)
+            return _mirror(right, temporary, [SEALED])
+        made = dataclasses.replace(settings, trials=settings.sealed_trials)
+        people, seed = settings.sealed_people, sealed_seed(settings)
+        return {SEALED: _make_part(made, people, seed, temporary / SEALED, SEALED, report)}
+
+    return _made(sealed_folder(settings, root), settings, fill)
+
+
+def _made(folder: Path, settings: SetSettings, fill: Callable[[Path], Yields]) -> Path:
+    """The folder, filled if it is not there, with what came of all attempts and the settings."""
     if folder.is_dir():
         remove_abandoned(folder)
         return folder
     with working_folder(folder) as temporary:
-        if settings.side == "left":
-            right = make_sealed(dataclasses.replace(settings, side="right"), root, report)
-            yields = _mirror(right, temporary, [SEALED])
-        else:
-            made = dataclasses.replace(settings, trials=settings.sealed_trials)
-            people, seed = settings.sealed_people, sealed_seed(settings)
-            yields = {SEALED: _make_part(made, people, seed, temporary / SEALED, SEALED, report)}
-        _finish(temporary, folder, settings, yields)
+        for name, told in ((YIELD, fill(temporary)), ("settings.json", dataclasses.asdict(settings))):
+            with replacing(temporary / name) as file:
+                file.write_text(json.dumps(told, indent=1))
+        temporary.chmod(0o755)
+        try:
+            temporary.rename(folder)
+        except OSError:
+            if not folder.is_dir():  # another process may have made the same set meanwhile: then its is as good
+                raise
     return folder
-
-
-def _finish(temporary: Path, folder: Path, settings: SetSettings, yields: Mapping[str, Mapping[str, int]]) -> None:
-    """Write what was made of which settings, and give the folder its name."""
-    for name, told in ((YIELD, yields), ("settings.json", dataclasses.asdict(settings))):
-        with replacing(temporary / name) as file:
-            file.write_text(json.dumps(told, indent=1))
-    temporary.chmod(0o755)
-    try:
-        temporary.rename(folder)
-    except OSError:
-        if not folder.is_dir():  # another process may have made the same set meanwhile: then its is as good
-            raise
 
 
 def _make_part(
@@ -172,7 +157,7 @@ def _make_part(
     return tally
 
 
-def _project_again(settings: SetSettings, usual: Path, folder: Path, report: Report) -> Mapping[str, Mapping[str, int]]:
+def _project_again(settings: SetSettings, usual: Path, folder: Path, report: Report) -> Yields:
     """Make both parts from the fitted motions of a set, with another projection; what came of that set's attempts."""
     hands, what = KinematicHands(axes=settings.capture.axes), f"projecting {settings.grasp} recordings"
     paths = [path for part in PARTS for path in demonstration_files(usual, part)]
@@ -188,7 +173,7 @@ def _project_again(settings: SetSettings, usual: Path, folder: Path, report: Rep
     return json.loads((usual / YIELD).read_text())
 
 
-def _mirror(right: Path, folder: Path, parts: Sequence[str]) -> Mapping[str, Mapping[str, int]]:
+def _mirror(right: Path, folder: Path, parts: Sequence[str]) -> Yields:
     """Make parts as mirror images of a set's, with their motions and truths; what came of that set's attempts."""
     for path in (path for part in parts for path in demonstration_files(right, part)):
         there = folder / path.parent.name
@@ -209,7 +194,7 @@ def _mirror(right: Path, folder: Path, parts: Sequence[str]) -> Mapping[str, Map
     return json.loads((right / YIELD).read_text())
 
 
-def _make_variations(settings: SetSettings, folder: Path, report: Report) -> Mapping[str, Mapping[str, int]]:
+def _make_variations(settings: SetSettings, folder: Path, report: Report) -> Yields:
     """Make both parts from recordings, and a page for each of these; what the parts hold."""
     given = settings.recording
     recorded = recorded_set(given, report)

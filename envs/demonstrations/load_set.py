@@ -10,6 +10,7 @@ from mjx_hand.motion.demonstration import Demonstration, load_demonstration
 
 PARTS = ("train", "heldout")
 SEALED = "sealed"  # what nothing is tuned on: made and evaluated apart, at the end
+EVERY_PART = (*PARTS, SEALED)
 
 
 def load_demonstrations(settings: SetSettings, part: str, root: str | Path) -> list[Demonstration]:
@@ -50,7 +51,7 @@ def load_part(folder: str | Path, part: str) -> list[Demonstration]:
 
 def is_divided(folder: str | Path) -> bool:
     """Whether a folder has a part for training, one held out or a sealed one."""
-    return any(Path(folder, part).is_dir() for part in (*PARTS, SEALED))
+    return any(Path(folder, part).is_dir() for part in EVERY_PART)
 
 
 def demonstration_files(folder: str | Path, part: str) -> list[Path]:
@@ -59,8 +60,8 @@ def demonstration_files(folder: str | Path, part: str) -> list[Path]:
     Raises:
         InputError: no such folder or part, or it holds no demonstrations.
     """
-    if part not in (*PARTS, SEALED):
-        raise InputError(f"part {part!r} is not known; valid: {', '.join((*PARTS, SEALED))}")
+    if part not in EVERY_PART:
+        raise InputError(f"part {part!r} is not known; valid: {', '.join(EVERY_PART)}")
     if not Path(folder).is_dir():
         raise InputError(f"{folder}: no such folder; give one that holds finished demonstrations, NNN.npz")
     where = Path(folder, part) if is_divided(folder) else Path(folder)

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.spatial.transform import Rotation
 
-from envs.evaluation.evaluate import evaluate
+from envs.evaluation.evaluate import evaluate_in
 from envs.evaluation.roll_out import make_roll_out, zero_residual
 from envs.grasps import grasp_names, grasp_type
 from envs.grasps.grasp_type import Pads, Wrap, wrap_torque
@@ -104,7 +104,7 @@ def search_press(env: TrackingEnv, hold: float) -> dict[str, float]:
         scores = []
         for share in SHARES:
             rollouts = roll_out(None, press.tables(dict.fromkeys(press.full, share)))
-            found = evaluate(rollouts, [d.object for d in env.demonstrations], env.body.palm).scores
+            found = evaluate_in(env, rollouts).scores
             scores.append(np.mean([found[name] for name in _JUDGED_BY if name in found], axis=0))
         return {"scores": np.array(scores)}
 

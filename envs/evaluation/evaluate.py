@@ -9,6 +9,7 @@ from jaxtyping import Bool, Int, Shaped
 from envs.evaluation import metrics
 from envs.evaluation.failure import FAILURES, failure_reasons
 from envs.evaluation.rollout import Rollouts
+from envs.tracking import TrackingEnv
 from mjx_hand.bodies.human_body import HUMAN_PALM
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import FINGERS, LINKS
@@ -92,6 +93,11 @@ def evaluate(
         failure=failure_reasons(rollouts, success),
         lost=metrics.lost(rollouts),
     )
+
+
+def evaluate_in(env: TrackingEnv, rollouts: Rollouts) -> Evaluation:
+    """`evaluate`, of rollouts of an environment's demonstrations and hand."""
+    return evaluate(rollouts, [demonstration.object for demonstration in env.demonstrations], env.body.palm)
 
 
 def _is_human(rollouts: Rollouts) -> bool:

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from envs.grip import grip_offsets
-from envs.scene import NUM_WRIST, OBJECT, demonstration_model
+from envs.scene import NUM_WRIST, OBJECT, demonstration_spec
 from mjx_hand.hand.joints import HINGES
 from mjx_hand.objects.description import OBJECT_KINDS
 from mjx_hand.objects.primitives import hull_planes
@@ -59,7 +59,7 @@ def test_before_the_grasp_and_for_idle_fingers_there_is_none(offsets, in_hand, l
 def test_more_force_presses_harder_in_mujoco(demonstrations, hands, offsets, in_hand, env, lifted):
     """The sum of the contact forces that the object feels from the fingers grows with the force asked for."""
     d, frame = demonstrations[0], int(lifted[0][20])
-    model = demonstration_model(d, hands[0])
+    model = demonstration_spec(d, hands[0]).compile()
     object_id = model.geom(OBJECT).id
     model.body_mass[model.body(OBJECT).id] *= 1000  # it stays where it is
     model.body_inertia[model.body(OBJECT).id] *= 1000

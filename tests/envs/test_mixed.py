@@ -9,7 +9,7 @@ import pytest
 from envs.demonstrations.scripted.trials import support_boxes
 from envs.grasps import grasp_type
 from envs.physics import make_engine
-from envs.scene import SPARE, TABLE, demonstration_model, demonstration_models
+from envs.scene import SPARE, TABLE, demonstration_models, demonstration_spec
 from envs.tracking import TrackingEnv
 from envs.twin import twin_of
 from mjx_hand.errors import InputError
@@ -47,7 +47,7 @@ def test_spare_boxes_change_nothing(mixed, hands, env, lifted):
     paths = []
     frame = lifted[0][10]
     for spare in (0, 3):
-        model = demonstration_model(mixed[0], hands[0], spare=spare)
+        model = demonstration_spec(mixed[0], hands[0], spare=spare).compile()
         data = mujoco.MjData(model)
         data.qpos[:] = np.asarray(env.tables.starts.qpos[0, frame])
         for k in range(10):
@@ -59,7 +59,10 @@ def test_spare_boxes_change_nothing(mixed, hands, env, lifted):
 
 
 def test_alone_no_type_has_spare_boxes(demonstrations, hands, env):
-    first, alone = demonstration_models(demonstrations, hands)[0], demonstration_model(demonstrations[0], hands[0])
+    first, alone = (
+        demonstration_models(demonstrations, hands)[0],
+        demonstration_spec(demonstrations[0], hands[0]).compile(),
+    )
     for model in (first, env.models[0]):
         np.testing.assert_array_equal(model.geom_pos, alone.geom_pos)
         assert model.names == alone.names

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from envs.grasps import grasp_type
 from envs.reference import make_reference
-from envs.scene import NUM_WRIST, base_rotation, demonstration_model
+from envs.scene import NUM_WRIST, base_rotation, demonstration_spec
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.objects.description import OBJECT_KINDS, ObjectDescription
@@ -67,7 +67,7 @@ def tracked(model, controls, start):
 
 def test_leading_the_targets_takes_the_controllers_lag_away(demonstrations, hands, reference):
     """In MuJoCo itself: the hand is nearer its demonstration than under the demonstrated targets, by three and more."""
-    model = demonstration_model(demonstrations[0], hands[0])
+    model = demonstration_spec(demonstrations[0], hands[0]).compile()
     targets = np.asarray(reference.targets[0], float)
     plain = np.abs(tracked(model, targets, targets[0]) - targets)
     led = np.abs(tracked(model, np.asarray(reference.controls[0], float), targets[0]) - targets)

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from envs.physics.solver import gauss_seidel
-from envs.scene import demonstration_model
+from envs.scene import demonstration_spec
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.motion.joint_motion import JointMotion
@@ -72,7 +72,7 @@ def test_the_left_hand_does_in_the_engine_what_the_right_one_does(falling):
     for d in (falling, mirrored_demonstration(falling)):
         hand = build_rigid_hand(load_hand(side=d.motion.side), d.shape)
         tips = np.asarray(finger_tips(d.motion.angles[0], hand), float)
-        (model,) = gauss_seidel([demonstration_model(d, hand)])
+        (model,) = gauss_seidel([demonstration_spec(d, hand).compile()])
         data = mujoco.MjData(model)
         data.qpos[-7:] = d.object_pose[0]
         data.qpos[6:26] = data.ctrl[6:26] = d.motion.angles[0]

@@ -143,7 +143,7 @@ def work(monkeypatch, tmp_path) -> list[str]:
         (Path(configs[0].out).parent / "evaluation.json").write_text(json.dumps(content))
 
     monkeypatch.setattr(experiments, "training_env", lambda config: None)
-    monkeypatch.setattr(experiments, "make_missing_sets", lambda data, root: None)
+    monkeypatch.setattr(experiments, "make_missing_sets", lambda data, root, sealed=False: None)
     monkeypatch.setattr(experiments, "train", train)
     monkeypatch.setattr(experiments, "evaluate_and_write", evaluate)
     monkeypatch.setattr(experiments, "enable_compile_cache", lambda: None)
@@ -180,7 +180,7 @@ def test_a_tiny_training_and_its_baselines(
     trained: tuple[Path, list[Point]], tiny: Config, env: TrackingEnv, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(experiments, "training_env", lambda config: env)
-    monkeypatch.setattr(experiments, "make_missing_sets", lambda data, root: None)
+    monkeypatch.setattr(experiments, "make_missing_sets", lambda data, root, sealed=False: None)
     monkeypatch.setattr(video, "side_by_side", lambda env, rollouts, index, path: Path(path).write_bytes(b"film"))
     out = tmp_path / "tiny" / "as_configured" / "seed0"
     shutil.copytree(trained[0], out)

@@ -170,7 +170,7 @@ def test_an_update_has_ended_before_anything_else_runs(tiny: Config, env: Tracki
             return np.zeros((), dtype)
 
     seen = []
-    update, evaluate = Learner.update, train.ppo.evaluate
+    update, evaluate = Learner.update, train.ppo.evaluate_in
 
     def begun(self: Learner, *args: Any) -> tuple[Any, Any]:
         seen.append("update")
@@ -182,7 +182,7 @@ def test_an_update_has_ended_before_anything_else_runs(tiny: Config, env: Tracki
         return evaluate(*args)
 
     monkeypatch.setattr(Learner, "update", begun)
-    monkeypatch.setattr(train.ppo, "evaluate", evaluated)
+    monkeypatch.setattr(train.ppo, "evaluate_in", evaluated)
     train.ppo.train(in_folder(tiny, tmp_path), env)
     one = ["update", "end of an update"]
     assert seen == [*one, "evaluation", "evaluation", *one, "evaluation"]

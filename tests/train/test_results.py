@@ -229,7 +229,7 @@ def work(monkeypatch, tmp_path) -> list[str]:
         (Path(configs[0].out).parent / "evaluation.json").write_text(json.dumps(content))
 
     monkeypatch.setattr(experiments, "training_env", lambda config: None)
-    monkeypatch.setattr(experiments, "make_missing_sets", lambda data, root: None)
+    monkeypatch.setattr(experiments, "make_missing_sets", lambda data, root, sealed=False: None)
     monkeypatch.setattr(experiments, "train", train)
     monkeypatch.setattr(experiments, "evaluate_and_write", evaluate)
     monkeypatch.setattr(experiments, "enable_compile_cache", lambda: None)
@@ -270,7 +270,7 @@ def test_ctrl_c_ends_in_one_line(work: list[str], monkeypatch, capsys):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(experiments, "training_env", stop)
-    monkeypatch.setattr(experiments, "make_missing_sets", lambda data, root: None)
+    monkeypatch.setattr(experiments, "make_missing_sets", lambda data, root, sealed=False: None)
     assert results.main(["names=[pinch]", "seeds=[0,1]", "ppo.num_timesteps=1000"]) == 130
     assert capsys.readouterr().err == "\nresults: stopped; the same command goes on from here\n"
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from envs.evaluation.constant_press import constant_press, search_press
-from envs.evaluation.evaluate import Evaluation, evaluate
+from envs.evaluation.evaluate import Evaluation, evaluate_in
 from envs.evaluation.overlap import Overlap, hand_overlap
 from envs.evaluation.roll_out import make_roll_out, zero_residual
 from envs.evaluation.rollout import Rollouts
@@ -76,7 +76,6 @@ def evaluate_seeds(configs: Sequence[Config]) -> dict[int, Results]:
     part = configs[0].part
     env = load_env(configs[0], part)
     checkpoints = {config.seed: chosen_checkpoint(config, env.observation_size, env.action_size) for config in configs}
-    objects = [demonstration.object for demonstration in env.demonstrations]
     policy = deterministic_policy(configs[0].ppo, env.observation_size, env.action_size)
     rollouts: dict[int | str, Rollouts] = {}
     with counter(len(configs) + len(BASELINES) + 1, "evaluating (sets of rollouts)") as advance:
@@ -91,7 +90,7 @@ def evaluate_seeds(configs: Sequence[Config]) -> dict[int, Results]:
         for title in BASELINES:
             rollouts[title] = roll_out(None, given[title])
             advance(1)
-    scores = {key: evaluate(each, objects, env.body.palm) for key, each in rollouts.items()}
+    scores = {key: evaluate_in(env, each) for key, each in rollouts.items()}
     overlaps = {key: hand_overlap(each, env.models) for key, each in rollouts.items()}
     keys = {seed: {POLICY: seed, **{title: title for title in BASELINES}} for seed in checkpoints}
     return {

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from envs.demonstrations.load_env import env_of_set
 from envs.demonstrations.load_set import is_divided
 from envs.disturbances.randomize import Randomize
-from envs.evaluation.evaluate import Evaluation, evaluate
+from envs.evaluation.evaluate import Evaluation, evaluate_in
 from envs.evaluation.roll_out import make_roll_out
 from envs.evaluation.rollout import Rollouts
 from envs.tracking import TrackingEnv
@@ -113,4 +113,4 @@ def rolled_out(config: Config, env: TrackingEnv) -> tuple[Checkpoint, Rollouts, 
     checkpoint = chosen_checkpoint(config, env.observation_size, env.action_size)
     policy = deterministic_policy(config.ppo, env.observation_size, env.action_size)
     rollouts = make_roll_out(env, policy)(checkpoint.policy)
-    return checkpoint, rollouts, evaluate(rollouts, [d.object for d in env.demonstrations], env.body.palm)
+    return checkpoint, rollouts, evaluate_in(env, rollouts)

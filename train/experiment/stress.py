@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 from envs.disturbances.randomize import Randomize
 from envs.evaluation.constant_press import constant_press, search_press
-from envs.evaluation.evaluate import Evaluation, evaluate
+from envs.evaluation.evaluate import Evaluation, evaluate_in
 from envs.evaluation.roll_out import make_roll_out, zero_residual
 from mjx_hand.progress import counter
 from train.experiment.evaluate_seeds import HOLD
@@ -81,7 +81,6 @@ def stress(configs: Sequence[Config]) -> Stress:
     checkpoints = {
         config.seed: chosen_checkpoint(config, recorded.observation_size, recorded.action_size) for config in configs
     }
-    objects, palm = [demonstration.object for demonstration in recorded.demonstrations], recorded.body.palm
     policy = deterministic_policy(first.ppo, recorded.observation_size, recorded.action_size)
     policies: dict[str, dict[int, Evaluation]] = {}
     presses: dict[str, Evaluation] = {}
@@ -96,11 +95,11 @@ def stress(configs: Sequence[Config]) -> Stress:
         for row, randomize in ROWS.items():
             tables = (recorded if row == RECORDED else load_env(first, part, randomize)).tables
             policies[row] = {
-                seed: evaluate(learned(checkpoint.policy, tables), objects, palm)
+                seed: evaluate_in(recorded, learned(checkpoint.policy, tables))
                 for seed, checkpoint in checkpoints.items()
             }
             scored = [
-                evaluate(zero(None, dataclasses.replace(tables, reference=reference)), objects, palm)
+                evaluate_in(recorded, zero(None, dataclasses.replace(tables, reference=reference)))
                 for reference in pressed
             ]
             presses[row] = max(scored, key=lambda evaluation: evaluation.scores["kept"].mean())

@@ -14,7 +14,7 @@ from hydra.core.config_store import ConfigStore
 from omegaconf import DictConfig, ListConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from envs.demonstrations.load_set import PARTS, SEALED
+from envs.demonstrations.load_set import EVERY_PART
 from envs.demonstrations.set_settings import SetSettings
 from envs.disturbances.randomize import Randomize
 from envs.physics import ENGINES
@@ -87,8 +87,8 @@ class Config:
             raise InputError(f"engine is {self.engine!r}; valid: auto, {', '.join(ENGINES)}")
         if self.hand != HUMAN:
             load_robot(self.hand)
-        if self.part not in (*PARTS, SEALED):
-            raise InputError(f"part is {self.part!r}; valid: {', '.join((*PARTS, SEALED))}")
+        if self.part not in EVERY_PART:
+            raise InputError(f"part is {self.part!r}; valid: {', '.join(EVERY_PART)}")
         if not self.out.strip():
             raise InputError("out is empty; give the folder to write to, such as out=outputs/pinch/seed0")
         for seed in (self.seed, *self.seeds):

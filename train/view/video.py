@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from envs.evaluation.rollout import Rollouts
-from envs.scene import demonstration_model
+from envs.scene import demonstration_spec
 from envs.tracking import TrackingEnv
 from mjx_hand.bodies.coordinates import hand_coordinates
 from mjx_hand.view.report import Film
@@ -32,7 +32,7 @@ def side_by_side(env: TrackingEnv, rollouts: Rollouts, index: int, path: str | P
     """
     which = int(rollouts.demonstration[index])
     demonstration = env.demonstrations[which]
-    model = demonstration_model(demonstration, env.hands[which], visual=True)
+    model = demonstration_spec(demonstration, env.hands[which], visual=True).compile()
     frames = np.flatnonzero(rollouts.counted[index])[:: max(round(rollouts.fps / _RATE), 1)]
     targets = np.asarray(env.reference.targets)[which]
     wanted = np.concatenate(

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from envs.demonstrations.on_robot.follow import solve
 from envs.demonstrations.on_robot.pads import Pads, demonstrated_pads
 from envs.model_grip import Touch
-from envs.scene import NUM_WRIST, base_rotation, demonstration_model, wrist_coordinates
+from envs.scene import NUM_WRIST, base_rotation, demonstration_spec, wrist_coordinates
 from mjx_hand.bodies.body import Body
 from mjx_hand.bodies.coordinates import coordinates_per_target, hand_coordinates
 from mjx_hand.errors import InputError
@@ -73,6 +73,27 @@ def on_robot(demonstration: Demonstration, person: RigidHand, body: Body) -> Bro
     return _Bringing(demonstration, person, body).brought()
 
 
+def moved_by(
+    body: Body,
+    demonstration: Demonstration,
+    angles: Float[np.ndarray, "t j"],
+    wrist_position: Float[np.ndarray, "t 3"],
+    wrist_quaternion: Float[np.ndarray, "t 4"],
+) -> Demonstration:
+    """The demonstration with a robot's joints (rad, m) and wrist poses (m, wxyz) in the place of the person's."""
+    motion = JointMotion(
+        fps=demonstration.motion.fps,
+        angles=angles,
+        wrist_position=wrist_position,
+        wrist_quaternion=wrist_quaternion,
+        valid=np.ones(len(angles), bool),
+        side=body.side,
+        source=f"{demonstration.motion.source} on {body.name}",
+        joint_names=body.joints,
+    )
+    return replace(demonstration, motion=motion)
+
+
 class _Bringing:
     """One demonstration on its way onto a robot."""
 
@@ -82,7 +103,7 @@ class _Bringing:
         self.base = base_rotation(demonstration)
         motion = demonstration.motion
         self.wrist = wrist_coordinates(motion.wrist_position, motion.wrist_quaternion, self.base)
-        self.model = demonstration_model(demonstration, body)
+        self.model = demonstration_spec(demonstration, body).compile()
         self.touch = Touch(self.model, body)
         self.count = body.num_targets
         self.mix = coordinates_per_target(self.model, self.count)
@@ -102,17 +123,9 @@ class _Bringing:
             )
         rows = self._follow(targets)
         turn = Rotation.from_matrix(self.base) * Rotation.from_euler("XYZ", rows[:, 3:NUM_WRIST])
-        motion = JointMotion(
-            fps=self.demonstration.motion.fps,
-            angles=rows[:, NUM_WRIST:],
-            wrist_position=rows[:, :3] @ self.base.T,
-            wrist_quaternion=turn.as_quat(scalar_first=True),
-            valid=np.ones(len(rows), bool),
-            side=self.body.side,
-            source=f"{self.demonstration.motion.source} on {self.body.name}",
-            joint_names=self.body.joints,
-        )
-        return Brought(replace(self.demonstration, motion=motion), fingers, off, depth, gap)
+        quaternion = turn.as_quat(scalar_first=True)
+        made = moved_by(self.body, self.demonstration, rows[:, NUM_WRIST:], rows[:, :3] @ self.base.T, quaternion)
+        return Brought(made, fingers, off, depth, gap)
 
     def _place(self, targets: np.ndarray, frame: int) -> None:
         self.touch.place(hand_coordinates(self.model, targets), self.demonstration.object_pose[frame])
@@ -182,10 +195,7 @@ class _Bringing:
         self._place(grasp, frame)
         near = self._near()
         wanted = [self.last[finger] for finger in pads.fingers]
-        data, bodies = self.touch.data, [self.model.body(self.touch.links[k]).id for k in wanted]
-        local = [
-            data.xmat[b].reshape(3, 3).T @ (near[k][1] - data.xpos[b]) for b, k in zip(bodies, wanted, strict=True)
-        ]
+        held = [self.touch.on_link(k, near[k][1]) for k in wanted]
         offset = np.array([near[k][1] for k in wanted]) - pads.places[frame]  # what the grasp could not do
         wrist = self._carried(grasp[:NUM_WRIST])
         unit = np.eye(self.count)
@@ -195,8 +205,8 @@ class _Bringing:
             def equations(targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
                 self._place(targets, at)
                 rows, values = [], []
-                for k, (link, b) in enumerate(zip(wanted, bodies, strict=True)):
-                    point = data.xpos[b] + data.xmat[b].reshape(3, 3) @ local[k]
+                for k, link in enumerate(wanted):
+                    point = self.touch.in_world(link, held[k])
                     rows.append(self._jacobian(link, point) / _PAD)
                     values.append((point - pads.places[at, k] - offset[k]) / _PAD)
                 rows += [unit[:NUM_WRIST] / weights[:, None], unit[NUM_WRIST:] / _CHANGE]

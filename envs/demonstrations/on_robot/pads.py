@@ -2,19 +2,16 @@
 
 import dataclasses
 
-import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from envs.model_grip import Touch
+from envs.model_grip import NEAR, Touch
 from envs.reference import demonstrated_targets
-from envs.scene import demonstration_model
+from envs.scene import demonstration_spec
 from mjx_hand.bodies.coordinates import hand_coordinates
 from mjx_hand.bodies.human_body import human_body
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.rigid.rigid_hand import RigidHand
-
-NEAR = 0.007  # m: a link nearer than this is taken to touch
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,7 +39,7 @@ def demonstrated_pads(demonstration: Demonstration, person: RigidHand) -> Pads:
     The frame of the grasp is the last in which as many fingers touch as ever do while the object is off its support.
     """
     body = human_body(person)
-    model = demonstration_model(demonstration, body)
+    model = demonstration_spec(demonstration, body).compile()
     touch = Touch(model, body)
     coordinates = hand_coordinates(model, demonstrated_targets(demonstration))
     found: dict[int, dict[str, tuple[int, np.ndarray, np.ndarray]]] = {}
@@ -60,19 +57,14 @@ def demonstrated_pads(demonstration: Demonstration, person: RigidHand) -> Pads:
     fingers = tuple(sorted(found[grasp], key=lambda name: (name != "thumb", body.fingers.index(name))))
     touch.place(coordinates[grasp], demonstration.object_pose[grasp])
     held = [found[grasp][finger] for finger in fingers]
-    bodies = [model.body(touch.links[number]).id for number, *_ in held]
-    data = touch.data
-    local = [
-        data.xmat[b].reshape(3, 3).T @ (point - data.xpos[b]) for b, (_, point, _) in zip(bodies, held, strict=True)
-    ]
+    on_links = [(number, touch.on_link(number, point)) for number, point, _ in held]
     places = np.empty((demonstration.num_frames, len(fingers), 3))
     sites = {finger: model.site(f"{finger}_tip").id for finger in body.fingers}
     tips = {finger: np.empty((demonstration.num_frames, 3)) for finger in body.fingers}
     for frame in range(demonstration.num_frames):
-        data.qpos[: coordinates.shape[1]] = coordinates[frame]
-        mujoco.mj_kinematics(model, data)
-        for k, (b, point) in enumerate(zip(bodies, local, strict=True)):
-            places[frame, k] = data.xpos[b] + data.xmat[b].reshape(3, 3) @ point
+        touch.place(coordinates[frame], demonstration.object_pose[frame])
+        for k, (number, place) in enumerate(on_links):
+            places[frame, k] = touch.in_world(number, place)
         for finger, site in sites.items():
-            tips[finger][frame] = data.site_xpos[site]
+            tips[finger][frame] = touch.data.site_xpos[site]
     return Pads(fingers, places, np.stack([way for *_, way in held]), tips, grasp)

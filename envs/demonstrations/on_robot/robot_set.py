@@ -5,15 +5,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from envs.demonstrations.on_robot.bring import on_robot
+from envs.demonstrations.on_robot.bring import moved_by, on_robot
 from mjx_hand.bodies.body import Body
 from mjx_hand.bodies.body_places import body_model
 from mjx_hand.errors import InputError
 from mjx_hand.files.array_cache import cached, model_bytes
 from mjx_hand.motion.demonstration import Demonstration
-from mjx_hand.motion.joint_motion import JointMotion
 from mjx_hand.progress import counter
-from mjx_hand.pytree import replace
 from mjx_hand.rigid.rigid_hand import RigidHand
 
 _MOTION = ("angles", "wrist_position", "wrist_quaternion")
@@ -53,19 +51,5 @@ def robot_demonstrations(
         if len(refused) == len(demonstrations):
             raise InputError(f"{body.name} can do none of {len(demonstrations)} demonstrations: {first}")
         print(f"{body.name}: {count} of {of_type} demonstrations of {grasp} left out: {first}", flush=True)
-    made = []
-    for k, d in enumerate(demonstrations):
-        if k not in refused:
-            angles, position, quaternion = (np.asarray(arrays[f"{name}.{k}"]) for name in _MOTION)
-            motion = JointMotion(
-                fps=d.motion.fps,
-                angles=angles,
-                wrist_position=position,
-                wrist_quaternion=quaternion,
-                valid=np.ones(d.num_frames, bool),
-                side=body.side,
-                source=f"{d.motion.source} on {body.name}",
-                joint_names=body.joints,
-            )
-            made.append(replace(d, motion=motion))
-    return made
+    kept = [(k, d) for k, d in enumerate(demonstrations) if k not in refused]
+    return [moved_by(body, d, *(np.asarray(arrays[f"{name}.{k}"]) for name in _MOTION)) for k, d in kept]

@@ -26,6 +26,7 @@ from mjx_hand.pytree import replace
 
 _FORCE = 4.5  # of `grip_force_of`: what the grasp that is searched for must hold with
 _ARRIVING = (0.45, 0.1)  # s before the lift: where the hand is at the object and has not moved it
+_PUT_DOWN = "the grasp that was searched for ends where the object is first put down"
 _EARLIEST = 1.5  # s before the lift that the approach takes
 
 
@@ -93,6 +94,8 @@ def _measured(
     moved = np.linalg.norm(made.motion.wrist_position - observed.recorded_hand[:end], axis=1)
     turned = Rotation.from_matrix(np.swapaxes(observed.sequence.hand_rotation[:end], 1, 2) @ wrist).magnitude()
     tips = last_phalanges(observed.hand)
+    behind = figures.first + round(end * figures.rate / made.motion.fps)  # of the recording, after the first carrying
+    left_out = {_PUT_DOWN: [(behind, figures.last)]} if behind <= figures.last else {}
     return dataclasses.replace(
         figures,
         gap=float(np.abs(gaps[carried][:, tips]).mean()),
@@ -100,8 +103,9 @@ def _measured(
         hand_moved=float(moved.mean()),
         hand_turned=float(turned.mean()),
         angles_moved=float(np.abs(made.motion.angles - observed.sequence.angles[:end]).mean()),
-        carried=1.0,
+        carried=1.0,  # in the search, which keeps no other
         lost=None,
+        left_out={**figures.left_out, **left_out},
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from envs.demonstrations.recordings.recorded_demonstration import Figures
-from envs.demonstrations.recordings.recorded_set import RecordedSet
+from envs.demonstrations.recordings.recorded_set import SEARCHED, RecordedSet
 from envs.demonstrations.recordings.recording_settings import RecordingSettings
 from envs.demonstrations.recordings.variations import held_out
 from mjx_hand.files.npz_archive import replacing
@@ -45,7 +45,9 @@ def recording_report(f: Figures, demonstration: Demonstration, part: str, settin
                 "hand in the object at most", f"{1e3 * f.depth:.1f} mm", f"{1e3 * f.depth_before:.1f} mm recorded"
             ),
             Headline("hand moved", f"{1e3 * f.hand_moved:.1f} mm", f"{np.rad2deg(f.hand_turned):.1f}°, on average"),
-            Headline("carried with nothing learned", f"{f.carried:.0%}", lost),
+            Headline("carried with nothing learned", f"{f.carried:.0%}", f"in the search for a grasp, {lost}")
+            if f.road == SEARCHED
+            else Headline("carried with nothing learned", f"{f.carried:.0%}", lost),
         ),
         sections=(
             Section("What every step did", [Table(("step", "result"), _steps(f, demonstration))]),

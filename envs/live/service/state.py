@@ -19,16 +19,15 @@ def state_message(snapshot: Snapshot, name: str, side: str) -> str:
         name: of the object.
         side: of the hand.
     """
-    wrist, thing = snapshot.poses[0], snapshot.poses[-1]
     state = {
         "schema": SCHEMA,
         "number": snapshot.number,
         "time": round(snapshot.time, 6),
         "side": side,
         "tracked": snapshot.tracked,
-        "wrist": _pose(wrist),
+        "wrist": _pose(snapshot.poses[0]),
         "angles": {hinge: round(float(angle), 5) for hinge, angle in zip(HINGES, snapshot.angles, strict=True)},
-        "objects": [{"name": name, **_pose(thing)}],
+        "objects": [{"name": name, **_pose(snapshot.poses[-1])}],
         "contacts": [
             {"link": touch.link, "object": name, "position": _rounded(touch.position), "force": _rounded(touch.force)}
             for touch in snapshot.touches

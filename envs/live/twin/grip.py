@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from envs.grip_force import grip_force_of
 from envs.scene import NUM_WRIST
 from mjx_hand.hand.joints import FINGERS, LINKS, NUM_HINGES
 from mjx_hand.rigid.gains import Gains
@@ -18,7 +19,6 @@ NEAR = 0.008  # m: a phalanx that is closer to the object is taken to touch
 _SAFETY = 4.0  # times the force that just holds the object's weight by friction between thumb and fingers
 _LEAST = 2.0  # N
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
-_GRAVITY = 9.81
 _SOON = 0.15  # s over which a grip is taken up and let go: a finger that comes near does not snap shut
 _THUMB = FINGERS.index("thumb")
 _HINGES = slice(NUM_WRIST, NUM_WRIST + NUM_HINGES)
@@ -48,7 +48,7 @@ class Grip:
     def __init__(self, model: mujoco.MjModel, body: int, mass: float, friction: float, gains: Gains):
         self._model, self._body, self._gains = model, body, gains
         self._links = {model.body(name).id: k for k, name in enumerate(LINKS)}
-        self._force = max(_LEAST, _SAFETY * mass * _GRAVITY / (2 * friction))
+        self._force = max(_LEAST, grip_force_of(mass, friction, _SAFETY / 2))
         self._jacobian = np.zeros((3, model.nv))
         self._offsets = np.zeros(NUM_HINGES)
 

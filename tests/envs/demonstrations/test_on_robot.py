@@ -12,7 +12,7 @@ from envs.demonstrations.on_robot.follow import solve
 from envs.demonstrations.on_robot.pads import demonstrated_pads
 from envs.demonstrations.set_settings import SetSettings
 from envs.reference import demonstrated_targets
-from envs.scene import OBJECT, demonstration_model
+from envs.scene import OBJECT, demonstration_spec
 from mjx_hand.bodies.robot_body import robot_body
 from mjx_hand.errors import InputError
 from tests.robots.urdfs import urdf_of
@@ -59,7 +59,7 @@ def test_fingers_touch_where_the_persons_do(brought, demonstrations, hands, alle
     assert brought.off.max() < 0.012
     assert brought.depth < 0.002
     d = brought.demonstration
-    model = demonstration_model(d, allegro)
+    model = demonstration_spec(d, allegro).compile()
     data, targets = mujoco.MjData(model), demonstrated_targets(d)
     thing = [g for g in range(model.ngeom) if model.geom_bodyid[g] == model.body(OBJECT).id]
     lifted = np.flatnonzero(d.object_pose[:, 2] - d.object_pose[0, 2] > 0.03)
@@ -79,7 +79,7 @@ def test_the_hand_moves_smoothly_and_within_its_limits(brought, allegro):
     motion = brought.demonstration.motion
     assert motion.joint_names == allegro.joints
     assert np.abs(np.diff(motion.angles, axis=0)).max() * motion.fps < 5.0  # rad/s
-    model = demonstration_model(brought.demonstration, allegro)
+    model = demonstration_spec(brought.demonstration, allegro).compile()
     low, high = model.actuator_ctrlrange[6:22].T
     assert (motion.angles >= low - 1e-9).all()
     assert (motion.angles <= high + 1e-9).all()

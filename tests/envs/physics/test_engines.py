@@ -13,7 +13,7 @@ from envs.physics.engine import check_family, default_engine
 from envs.physics.mjx import MjxEngine
 from envs.physics.native import NativeEngine
 from envs.physics.solver import newton
-from envs.scene import NUM_WRIST, demonstration_model
+from envs.scene import NUM_WRIST, demonstration_spec
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.pytree import replace
@@ -189,7 +189,7 @@ def test_warp_drops_objects_of_other_masses_and_sizes_as_mujoco_does(env, demons
     pytest.importorskip("warp", reason="the extra mjx-hand[warp] is not installed")
     d = demonstrations[0]
     big = replace(d, object=replace(d.object, size=d.object.size * 1.5, mass=d.object.mass * 4))
-    models = [demonstration_model(d, hands[0]), demonstration_model(big, hands[0])]
+    models = [demonstration_spec(d, hands[0]).compile(), demonstration_spec(big, hands[0]).compile()]
     engine = make_engine("warp", models, SUBSTEPS)
     q = np.stack([np.asarray(env.tables.starts.qpos[0, 0])] * 2)
     q[:, THING.stop - 1] += 0.03

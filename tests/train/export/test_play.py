@@ -13,7 +13,7 @@ from envs.demonstrations.twin_hands import twins
 from envs.evaluation.evaluate import Evaluation
 from envs.evaluation.rollout import Rollouts
 from envs.physics.solver import gauss_seidel
-from envs.scene import demonstration_model
+from envs.scene import demonstration_spec
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import load_demonstration
 from mjx_hand.objects.description import ObjectDescription
@@ -88,7 +88,7 @@ def test_the_scene_is_the_engines_to_the_last_bit():
     hulls = np.stack([corners, corners + np.array([0.01 / 3, 0, 0.02])])
     mesh = ObjectDescription(size=np.full(3, 0.04), mass=1 / 7, friction=2 / 3, hulls=hulls, kind="mesh")
     for made in (demonstration, replace(demonstration, object=mesh)):
-        (engine,) = gauss_seidel([demonstration_model(made, hand)])
+        (engine,) = gauss_seidel([demonstration_spec(made, hand).compile()])
         loaded = mujoco.MjModel.from_xml_string(scene_xml(made, hand))
         assert set(differing(engine, loaded)) <= {"site_size", "names", "paths", "text_data"}
         for name in ("timestep", "solver", "iterations", "cone", "impratio", "integrator", "disableflags"):

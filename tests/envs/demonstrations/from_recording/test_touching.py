@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.from_recording.grasp_pose import GraspPose, capsule_gaps, last_phalanges
-from envs.demonstrations.from_recording.touching import DEPTH, GraspPose, corrected, gaps_over_time, touching_shares
+from envs.demonstrations.from_recording.touching import DEPTH, corrected, gaps_over_time, touching_shares
 from envs.demonstrations.scripted.grasp_posture import solve_postures
 from envs.grasps import grasp_type
 from mjx_hand.hand.joints import FINGERS

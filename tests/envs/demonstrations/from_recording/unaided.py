@@ -5,7 +5,7 @@ import numpy as np
 
 from envs.physics.solver import gauss_seidel
 from envs.reference import make_reference
-from envs.scene import demonstration_model
+from envs.scene import demonstration_spec
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand
@@ -14,7 +14,7 @@ from mjx_hand.rigid.rigid_hand import RigidHand
 def unaided(demonstration: Demonstration, hand: RigidHand, force: float) -> np.ndarray:
     """The object's pose in every frame, with a grip of `force` newtons."""
     reference = make_reference([demonstration], [hand], grip_force=force, gains=Gains())
-    (model,) = gauss_seidel([demonstration_model(demonstration, hand)])
+    (model,) = gauss_seidel([demonstration_spec(demonstration, hand).compile()])
     data = mujoco.MjData(model)
     data.qpos[:] = np.concatenate([reference.targets[0, 0], demonstration.object_pose[0]])
     poses = [demonstration.object_pose[0]]
