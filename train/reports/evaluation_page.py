@@ -182,6 +182,7 @@ def evaluation_page(
         ],
         commands=[
             f"python -m train.evaluate config={config.name} seeds=[{seeds.replace(' ', '')}]"
+            + ("" if config.part == Config().part else f" part={config.part}")
             + (" stress=true" if disturbed else "")
         ],
     )

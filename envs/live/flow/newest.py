@@ -1,4 +1,4 @@
-"""`Newest`: a place for one thing, of which the newest wins."""
+"""`Newest`: a place for one item, of which the newest wins."""
 
 import threading
 from typing import Generic, TypeVar
@@ -20,11 +20,11 @@ class Newest(Generic[Kind]):
         self._held: Kind | None = None
         self.replaced = 0
 
-    def put(self, thing: Kind) -> None:
+    def put(self, item: Kind) -> None:
         """Put in; what was there is replaced."""
         with self._changed:
             self.replaced += self._held is not None
-            self._held = thing
+            self._held = item
             self._changed.notify()
 
     def take(self, seconds: float = 0.0) -> Kind | None:
@@ -32,5 +32,5 @@ class Newest(Generic[Kind]):
         with self._changed:
             if self._held is None and seconds > 0:
                 self._changed.wait_for(lambda: self._held is not None, seconds)
-            thing, self._held = self._held, None
-            return thing
+            item, self._held = self._held, None
+            return item

@@ -66,7 +66,7 @@ class Recorder:
         self._poses, self._rotations, self.on = [], [], False
         if not poses:
             return None
-        hand, thing = np.stack(poses, axis=1)
+        hand, carried = np.stack(poses, axis=1)
         description = self._table.object
         motion = Motion(
             fps=self._fps,
@@ -81,8 +81,8 @@ class Recorder:
         found = RecordedObject(
             name=self._table.name,
             kind=description.kind,
-            position=thing[:, :3],
-            quaternion=thing[:, 3:],
+            position=carried[:, :3],
+            quaternion=carried[:, 3:],
             seen=np.ones(len(hand), bool),
             size=np.zeros(3) if description.kind == "mesh" else np.asarray(description.size, float),
             vertices=np.asarray(self._mesh[0], float),

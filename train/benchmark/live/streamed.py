@@ -104,8 +104,8 @@ def is_held(shown: Demonstration, assist: str, seed: int) -> bool:
 
 def _in_palm(world: World) -> Float[np.ndarray, "3"]:
     """Where the object's centre is, seen from the wrist (m)."""
-    wrist, thing = world.poses()[[0, -1]]
-    return Rotation.from_quat(wrist[3:], scalar_first=True).inv().apply(thing[:3] - wrist[:3])
+    wrist, carried = world.poses()[[0, -1]]
+    return Rotation.from_quat(wrist[3:], scalar_first=True).inv().apply(carried[:3] - wrist[:3])
 
 
 def _row(name: str, shares: Sequence[float] | np.ndarray) -> str:
