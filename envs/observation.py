@@ -1,9 +1,11 @@
 """The policy's observation, from qpos, qvel and sensors alone; `mjx_hand.player.features` says what it holds."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from envs.approach import followed
 from envs.physics.engine import PhysicsState
 from envs.reference import Reference
 from envs.scene import NUM_WRIST
@@ -55,9 +57,10 @@ def observe(
     frame: Int[Array, ""],
     physics: PhysicsState,
     residual: Float[Array, "u"],
+    displacement: Float[Array, "3"] | None = None,
 ) -> Float[Array, "o"]:
-    """The observation at `frame` of a demonstration."""
-    seen = _seen(reference, task, body, demonstration, frame, physics, residual)
+    """The observation at `frame` of a demonstration; `displacement` is where the wrist's path goes with the object."""
+    seen = _seen(reference, task, body, demonstration, frame, physics, residual, displacement)
     table = observed_features(task, body.names)
     offset, scale = offsets_and_scales(table)
     features = jnp.concatenate([feature.value(seen).ravel() for feature in table])
@@ -72,10 +75,15 @@ def _seen(
     frame: Int[Array, ""],
     physics: PhysicsState,
     residual: Float[Array, "u"],
+    displacement: Float[Array, "3"] | None,
 ) -> Seen:
     base, length = reference.base[demonstration], reference.length[demonstration]
-    targets, poses = reference.targets[demonstration], reference.object_pose[demonstration]
+    poses = reference.object_pose[demonstration]
     later = jnp.minimum(frame + jnp.array(task.lookahead), length - 1)
+    frames = jnp.concatenate([frame[None], later])
+    targets = reference.targets[demonstration, frames]
+    if displacement is not None:
+        targets = targets + jax.vmap(lambda k: followed(reference, demonstration, k, displacement))(frames)
     hand, first = body.of_targets(physics.qpos), body.num_coordinates
     object_pose = physics.qpos[first:]
     return Seen(
@@ -90,11 +98,11 @@ def _seen(
         wrist_axes=wrist_rotation(hand[3:NUM_WRIST], base),
         tips=physics.sensordata.reshape(-1, 3),
         base=base,
-        target=targets[frame],
+        target=targets[0],
         grip=reference.grip[demonstration, frame],
         pose=poses[frame],
         first_pose=poses[0],
-        targets_ahead=targets[later],
+        targets_ahead=targets[1:],
         poses_ahead=poses[later],
         phase=(frame / length)[None],
         object_features=reference.features[demonstration],

@@ -23,6 +23,7 @@ from mjx_hand.files.array_cache import cached, model_bytes
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.objects.description import OBJECT_KINDS, ObjectDescription
 from mjx_hand.objects.primitives import hull_planes
+from mjx_hand.player.approach import approach_weights
 from mjx_hand.pytree import pytree
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand, finger_tips, stack_hands, without_meshes
@@ -38,6 +39,7 @@ class Reference:
         grip: the share of the controls that presses the fingers on the object.
         tips: finger tips in the world, as demonstrated, in the order of the hand's fingers.
         object_pose: in the world.
+        approach: how far the wrist's path goes with an object that is seen elsewhere (`mjx_hand.player.approach`).
         base: world_from_base of each scene's wrist.
         features: object size (m), mass (kg), friction, and 1 for its kind among `OBJECT_KINDS`.
         length: frames of each demonstration.
@@ -48,6 +50,7 @@ class Reference:
     grip: Float[Array, "d t u"]
     tips: Float[Array, "d t tips 3"]
     object_pose: Float[Array, "d t 7"]
+    approach: Float[Array, "d t"]
     base: Float[Array, "d 3 3"]
     features: Float[Array, "d f"]
     length: Int[Array, "d"]
@@ -75,11 +78,12 @@ def make_reference(
     _check(demonstrations)
     forces = _grip_forces(demonstrations, grip_force)
     frames = max(d.num_frames for d in demonstrations)
-    targets, poses, bases = [], [], []
+    targets, poses, bases, approach = [], [], [], []
     for d in demonstrations:
         targets.append(padded(demonstrated_targets(d), frames))
         poses.append(padded(d.object_pose, frames))
         bases.append(base_rotation(d))
+        approach.append(padded(approach_weights(np.asarray(d.object_pose), d.motion.fps), frames))
     targets = jnp.asarray(np.stack(targets), jnp.float32)
     grip = grip_table(demonstrations, hands, targets, np.where(forces > 0, forces, np.nan), gains)
     features = [[*d.object.size, d.object.mass, d.object.friction, *_one_of_kinds(d)] for d in demonstrations]
@@ -89,6 +93,7 @@ def make_reference(
         grip=grip,
         tips=jnp.asarray(_tips(demonstrations, hands, targets), jnp.float32),
         object_pose=jnp.asarray(np.stack(poses), jnp.float32),
+        approach=jnp.asarray(np.stack(approach), jnp.float32),
         base=jnp.asarray(np.stack(bases), jnp.float32),
         features=jnp.asarray(features, jnp.float32),
         length=jnp.array([d.num_frames for d in demonstrations]),

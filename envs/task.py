@@ -34,6 +34,8 @@ class Task:
         grip_force: force (N) with which the reference presses fingers that touch; 0 leaves demonstrations as they are,
             null takes that of each demonstration's grasp type.
         lookahead: how many frames ahead the policy sees the reference.
+        follow_object: whether the wrist's path goes to where the object is seen to stand, and back to the demonstrated
+            one once it is held (`mjx_hand.player.approach`).
         observe_properties: whether the policy sees the object's mass and friction, which no camera does.
     """
 
@@ -52,7 +54,8 @@ class Task:
     random_start_prob: float = 0.7
     grip_force: float | None = None
     lookahead: tuple[int, ...] = (1, 4, 12)
-    observe_properties: bool = True
+    follow_object: bool = True
+    observe_properties: bool = False
 
     def __post_init__(self):
         positive = (

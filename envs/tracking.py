@@ -14,6 +14,8 @@ import numpy as np
 from brax.envs.base import Env, State
 from jaxtyping import Array, Float, Int
 
+from envs.approach import followed
+from envs.assistance import assistance
 from envs.disturbances.episode import delayed, pushing, seen_pose
 from envs.disturbances.randomize import Randomize
 from envs.disturbances.tables import disturbance_tables, disturbed_start
@@ -167,9 +169,8 @@ class TrackingEnv(Env):
         episode = None
         if (tables := self.tables.disturbances) is not None:
             key = jax.random.fold_in(jax.random.key(0), demonstration) if rng is None else rng
-            frame, physics, episode = disturbed_start(
-                tables, self.reference.controls, demonstration, frame, physics, key
-            )
+            told = tables, self.reference, self.task.follow_object
+            frame, physics, episode = disturbed_start(*told, demonstration, frame, physics, key)
         twin = Twin(
             physics=physics,
             demonstration=demonstration,
@@ -229,23 +230,22 @@ class TrackingEnv(Env):
         )
         frame = jnp.minimum(twin.frame + 1, self.reference.length[twin.demonstration] - 1)
         target = self.reference.controls[twin.demonstration, frame] + residual
+        if twin.episode is not None:
+            target = target + followed(self.reference, twin.demonstration, frame, twin.episode.displacement)
         return frame, residual, jnp.clip(target, self.tables.low, self.tables.high)
 
     def _assistance(self, twin: Twin, frame: Int[Array, ""], progress: Float[Array, ""]) -> Float[Array, "6"]:
         """The virtual object controller's force (N, world) and torque (N m, the object's axes)."""
-        stiffness = self.task.assist_stiffness(progress)
-        damping = 2 * jnp.sqrt(stiffness)
-        mass, inertia = self.tables.inertia[twin.demonstration]
-        poses = self.reference.object_pose[twin.demonstration]
-        now, wanted = poses[twin.frame], poses[frame]
-        first = self.body.num_coordinates
-        object_pose, speed = twin.physics.qpos[first:], twin.physics.qvel[first:]
-        moving = (wanted[:3] - now[:3]) * self.fps
-        turn = quaternion_difference(object_pose[3:], wanted[3:])
-        turning = quaternion_difference(now[3:], wanted[3:]) * self.fps
-        force = stiffness * (wanted[:3] - object_pose[:3]) + damping * (moving - speed[:3])
-        torque = stiffness * turn + damping * (turning - speed[3:])
-        return jnp.concatenate([mass * force, inertia * torque])
+        poses, first = self.reference.object_pose[twin.demonstration], self.body.num_coordinates
+        return assistance(
+            twin.physics.qpos[first:],
+            twin.physics.qvel[first:],
+            poses[twin.frame],
+            poses[frame],
+            self.fps,
+            self.tables.inertia[twin.demonstration],
+            self.task.assist_stiffness(progress),
+        )
 
     def _observe(self, twin: Twin) -> Float[Array, "o"]:
         physics, tables = twin.physics, self.tables.disturbances
@@ -253,7 +253,8 @@ class TrackingEnv(Env):
             n = self.body.num_coordinates
             seen = seen_pose(twin.episode, tables.episode, twin.frame, physics.qpos[n:])
             physics = dataclasses.replace(physics, qpos=jnp.concatenate([physics.qpos[:n], seen]))
-        return observe(self.reference, self.task, self.body, twin.demonstration, twin.frame, physics, twin.residual)
+        told = self.reference, self.task, self.body, twin.demonstration, twin.frame, physics, twin.residual
+        return observe(*told, twin.episode and twin.episode.displacement)
 
     def _tracked(self, twin: Twin, position: Array, rotation: Array, action: Array, moved: Array) -> TrackedStep:
         """What the reward is counted from; `moved` is how far the residual went in this step."""

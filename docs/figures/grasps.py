@@ -24,7 +24,7 @@ def main(root: Path) -> None:
     rows = []
     for name in TYPES:
         with shares() as report:
-            folder = make_set(SetSettings(name, people=1, heldout_people=1, trials=2), root, report)
+            folder = make_set(SetSettings(name, people=1, heldout_people=1, trials=2, heldout_trials=1), root, report)
         demonstrations = load_part(folder, "train")
         rows.append(contact_sheet(demonstrations, twins(demonstrations), rows=1, size=400))  # twice what is kept
     picture = Image.fromarray(np.concatenate(rows)).reduce(2).quantize(256)

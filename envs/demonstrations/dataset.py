@@ -74,10 +74,10 @@ def make_set(settings: SetSettings, root: str | Path, report: Report = lambda wh
             return _mirror(make_set(right, root, report), temporary, PARTS)
         if (usual := dataclasses.replace(settings, capture=settings.capture.projected_as_usual())) != settings:
             return _project_again(settings, make_set(usual, root, report), temporary, report)
-        parts = dict(zip(PARTS, (settings.people, settings.heldout_people), strict=True))
+        counts = (settings.people, settings.trials), (settings.heldout_people, settings.heldout_trials)
         return {
-            part: _make_part(settings, people, settings.seed + offset * _APART, temporary / part, part, report)
-            for offset, (part, people) in enumerate(parts.items())
+            part: _make_part(settings, count, settings.seed + offset * _APART, temporary / part, part, report)
+            for offset, (part, count) in enumerate(zip(PARTS, counts, strict=True))
         }
 
     return _made(set_folder(settings, root), settings, fill)
@@ -94,9 +94,8 @@ def make_sealed(settings: SetSettings, root: str | Path, report: Report = lambda
         if settings.side == "left":
             right = make_sealed(dataclasses.replace(settings, side="right"), root, report)
             return _mirror(right, temporary, [SEALED])
-        made = dataclasses.replace(settings, trials=settings.sealed_trials)
-        people, seed = settings.sealed_people, sealed_seed(settings)
-        return {SEALED: _make_part(made, people, seed, temporary / SEALED, SEALED, report)}
+        count, seed = (settings.sealed_people, settings.sealed_trials), sealed_seed(settings)
+        return {SEALED: _make_part(settings, count, seed, temporary / SEALED, SEALED, report)}
 
     return _made(sealed_folder(settings, root), settings, fill)
 
@@ -120,9 +119,10 @@ def _made(folder: Path, settings: SetSettings, fill: Callable[[Path], Yields]) -
 
 
 def _make_part(
-    settings: SetSettings, people: int, seed: int, folder: Path, part: str, report: Report
+    settings: SetSettings, count: tuple[int, int], seed: int, folder: Path, part: str, report: Report
 ) -> Mapping[str, int]:
-    """Make one part; what came of its attempts."""
+    """Make one part, of so many people with so many trials each; what came of its attempts."""
+    people, each = count
     model = load_hand()
     grasp = grasp_type(settings.grasp)
     rng = np.random.default_rng(seed)
@@ -130,11 +130,11 @@ def _make_part(
     hands = [build_rigid_hand(model, shape) for shape in shapes]
     given = {"mass": settings.object_mass, "density": settings.object_density}
     own = own_object(settings.object, grasp, **given) if settings.object else None
-    wanted, what = people * settings.trials, f"{part} {grasp.name}"
+    wanted, what = people * each, f"{part} {grasp.name}"
     trials, tally = perform_trials(
         grasp,
         hands,
-        settings.trials,
+        each,
         seed,
         lambda kept, tried: report(f"performing {what} grasps", kept / wanted),
         own,

@@ -28,8 +28,8 @@ class SetSettings:
         grasp: name of the grasp type, "all" for a set of each type, "recorded" for what a real recording shows, or
             "given" for a folder of finished demonstrations, of which nothing is made.
         people: random hand shapes in the training part.
-        heldout_people: others, in the held-out part.
-        trials: demonstrations of each person.
+        trials: demonstrations of each of them.
+        heldout_people, heldout_trials: others, in the held-out part, and the demonstrations of each.
         sealed_people, sealed_trials: those of the sealed part, which is made and evaluated apart, after everything was
             chosen (`sealed_folder`).
         seed: of every draw; the held-out part uses the next one.
@@ -44,8 +44,9 @@ class SetSettings:
 
     grasp: str
     people: int = 8
-    heldout_people: int = 4
     trials: int = 8
+    heldout_people: int = 20
+    heldout_trials: int = 3
     sealed_people: int = 20
     sealed_trials: int = 3
     seed: int = 0
@@ -88,7 +89,7 @@ class SetSettings:
             )
         if self.object_mass is not None and self.object_density is not None:
             raise InputError("both data.object_mass and data.object_density are given; give one of them")
-        for name in ("people", "heldout_people", "trials", "sealed_people", "sealed_trials"):
+        for name in ("people", "trials", "heldout_people", "heldout_trials", "sealed_people", "sealed_trials"):
             if getattr(self, name) < 1:
                 raise InputError(f"data.{name} is {getattr(self, name)}; it must be at least 1")
         if self.seed < 0:
@@ -131,7 +132,7 @@ def sealed_folder(settings: SetSettings, root: str | Path) -> Path:
         )
     told = fingerprint(settings)
     told |= {"people": settings.sealed_people, "trials": settings.sealed_trials}
-    del told["heldout_people"]
+    del told["heldout_people"], told["heldout_trials"]
     return Path(root) / f"{settings.grasp}-sealed-{_digest([_VERSION, told, _performed(settings.grasp)])[:10]}"
 
 

@@ -9,11 +9,11 @@ import numpy as np
 from jaxtyping import Array, Float, Int, UInt32
 
 from envs.disturbances.randomize import MOST_DELAY, Randomize
+from mjx_hand.player.approach import HELD_AWAY
 from mjx_hand.pytree import pytree
 from mjx_hand.rotations import exp, matrix_to_quaternion, quaternion_to_matrix
 
 _NEVER = 2**30
-_HELD_AWAY = 0.01  # m from its first place: an object that is held
 
 
 @pytree
@@ -51,6 +51,7 @@ class Episode:
         push: force on the object (N, world) from control step `push_start` on.
         push_start: the frame before it.
         key: of the noise, with the frame folded in; a key's data, so that worlds are plain numbers.
+        displacement: where the object was seen at first, from where the demonstration has it: x, y (m), turn (rad).
     """
 
     delay: Int[Array, "*b"]
@@ -59,6 +60,7 @@ class Episode:
     push: Float[Array, "*b 3"]
     push_start: Int[Array, "*b"]
     key: UInt32[Array, "*b k"]
+    displacement: Float[Array, "*b 3"]
 
 
 def episode_tables(randomize: Randomize, object_poses: Sequence[Float[np.ndarray, "_ 7"]], fps: float) -> EpisodeTables:
@@ -79,7 +81,7 @@ def episode_tables(randomize: Randomize, object_poses: Sequence[Float[np.ndarray
 
 def _held(pose: Float[np.ndarray, "_ 7"], steps: int) -> tuple[int, int]:
     """The first and the last frame of a demonstration from which a push of so many steps finds the object held."""
-    away = np.linalg.norm(pose[:, :3] - pose[0, :3], axis=1) > _HELD_AWAY
+    away = np.linalg.norm(pose[:, :3] - pose[0, :3], axis=1) > HELD_AWAY
     first = int(away.argmax()) if away.any() else _NEVER
     return first, max(len(pose) - 2 - steps, first)  # over before the last frame, which an evaluation holds on
 
@@ -104,6 +106,7 @@ def draw_episode(
         push=force * pushed * sideways,
         push_start=jax.random.randint(keys[9], (), first, last + 1),
         key=jax.random.key_data(keys[8]),
+        displacement=jnp.zeros(3),
     )
 
 

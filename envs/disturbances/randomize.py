@@ -14,8 +14,8 @@ _FACTORS = ("mass", "friction", "size", "gains")  # neutral at 1, all other rang
 class Randomize:
     """Ranges (least, greatest) that a disturbance is drawn from; equal ones set it to that value.
 
-    The reference stays what was recorded, whatever is disturbed: where the object stands elsewhere, the hand has to go
-    there and bring it back to where the recording has it. The policy sees the recording's mass, friction and size.
+    The object's reference stays what was recorded, whatever is disturbed: where the object stands elsewhere, the hand
+    has to go there and bring it back to where the recording has it. The policy sees the recording's size.
 
     Scenes of several masses, frictions, sizes, gains and places are compiled when an environment is made, `variants`
     for each demonstration; a reset draws one of them. All else is drawn by the reset itself.

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from mjx_hand.errors import InputError
+from mjx_hand.player.approach import approach_weights, displacement, moved_wrist
 from mjx_hand.player.exported_policy import ExportedPolicy, load_exported_policy
 from mjx_hand.player.features import WRIST, Feature, HandNames, Seen, feature_table
 from mjx_hand.player.tracking_reference import TrackingReference, load_tracking_reference
@@ -74,6 +75,8 @@ def play_policy(policy: str | Path | ExportedPolicy, reference: str | Path) -> P
 class Player:
     """One world of plain MuJoCo under a policy, a control step at a time.
 
+    The object may be put elsewhere in `data.qpos` before the first step; the hand goes there.
+
     Attributes:
         model, data: MuJoCo's.
         frame: of the demonstration.
@@ -93,13 +96,16 @@ class Player:
         self._lookahead = np.array(policy.contract["lookahead"])
         self.frame, self.residual = 0, np.zeros(len(joints), np.float32)
         self.data.qpos[:], self.data.qvel[:] = reference.start_qpos, reference.start_qvel
+        self._weights = approach_weights(reference.object_pose, reference.rate)
+        self._displacement: np.ndarray | None = None
 
     def step(self) -> None:
         """Look, act, and let the physics run to the next frame; past the end the last frame is held."""
         reference = self.reference
         _, self.residual = self.policy.step(self.features())
         self.frame = min(self.frame + 1, reference.num_frames - 1)
-        self.data.ctrl[:] = np.clip(reference.controls[self.frame] + self.residual, reference.low, reference.high)
+        command = reference.controls[self.frame] + self._followed(self.frame) + self.residual
+        self.data.ctrl[:] = np.clip(command, reference.low, reference.high)
         for _ in range(reference.substeps):
             mujoco.mj_step(self.model, self.data)
 
@@ -107,6 +113,28 @@ class Player:
         """What the policy is given now, in physical units."""
         seen = self._seen()
         return np.concatenate([np.ravel(feature.value(seen)) for feature in self._features])
+
+    @property
+    def displacement(self) -> Float[np.ndarray, "3"] | None:
+        """Where the object stood when the episode began, from where the demonstration has it: x, y (m), turn (rad).
+
+        None where that is the same, or the policy's task does not follow the object.
+        """
+        if self._displacement is None:
+            moved = displacement(self.data.qpos[-_FREE:], self.reference.object_pose[0].astype(float), np)
+            follows = self.policy.contract.get("follow_object", False)
+            self._displacement = moved * follows
+        return self._displacement if self._displacement.any() else None
+
+    def _followed(self, frame: int) -> Float[np.ndarray, "u"]:
+        """What is added to the demonstrated targets at a frame, because the object stands elsewhere."""
+        target = self.reference.targets[frame].astype(float)
+        added = np.zeros_like(target)
+        if (moved := self.displacement) is not None:
+            wrist, centre = target[: len(WRIST)], self.reference.object_pose[0, :3]
+            weighted = moved * self._weights[frame]
+            added[: len(WRIST)] = moved_wrist(wrist, self.reference.base, centre, weighted, np)
+        return added
 
     def _seen(self) -> Seen:
         reference, data, frame = self.reference, self.data, self.frame
@@ -125,11 +153,11 @@ class Player:
             wrist_axes=data.xmat[self._wrist].reshape(3, 3),
             tips=data.site_xpos[self._tips],
             base=reference.base,
-            target=reference.targets[frame],
+            target=reference.targets[frame] + self._followed(frame),
             grip=reference.grip[frame],
             pose=reference.object_pose[frame],
             first_pose=reference.object_pose[0],
-            targets_ahead=reference.targets[later],
+            targets_ahead=reference.targets[later] + np.stack([self._followed(k) for k in later]),
             poses_ahead=reference.object_pose[later],
             phase=np.array([frame / reference.num_frames]),
             object_features=reference.object_features,

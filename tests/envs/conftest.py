@@ -14,7 +14,7 @@ from envs.tracking import TrackingEnv
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.rigid.rigid_hand import RigidHand
 
-SETTINGS = SetSettings("pinch", people=2, heldout_people=1, trials=1, seed=3)
+SETTINGS = SetSettings("pinch", people=2, heldout_people=1, trials=1, heldout_trials=1, seed=3)
 
 
 @pytest.fixture(scope="session")

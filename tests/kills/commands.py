@@ -28,7 +28,7 @@ def _retarget(inputs: Path) -> Command:
 
 
 def _demonstrations(inputs: Path) -> Command:
-    few = ("config=pinch", "data.people=1", "data.heldout_people=1", "data.trials=1")
+    few = ("config=pinch", "data.people=1", "data.heldout_people=1", "data.trials=1", "data.heldout_trials=1")
     return lambda out: [sys.executable, "-m", "envs.demonstrations", *few, f"demonstrations={out}"]
 
 

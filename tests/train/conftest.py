@@ -41,7 +41,7 @@ def tiny(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureReques
         engine="native",
         out=str(tmp_path_factory.mktemp("tiny") / "out"),
         demonstrations=str(shared / "demonstrations"),
-        data=SetSettings(grasp="pinch", people=1, heldout_people=1, trials=1),
+        data=SetSettings(grasp="pinch", people=1, heldout_people=1, trials=1, heldout_trials=1),
         ppo=TINY,
         checks=Checks(every=32),
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-FEW = ("data.people=1", "data.heldout_people=1", "data.trials=1")
+FEW = ("data.people=1", "data.heldout_people=1", "data.trials=1", "data.heldout_trials=1")
 SHORT = ("ppo.num_timesteps=64", "ppo.num_envs=8", "ppo.unroll_length=8", "checks.every=64")
 
 

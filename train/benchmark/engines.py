@@ -148,7 +148,7 @@ def _left_out(engines: Sequence[str], grasps: Sequence[str], compiled: Sequence[
 
 def config(engine: str, grasp: str, demonstrations: Path) -> Config:
     """The experiment that is measured: the type's task on a small set."""
-    data = SetSettings(grasp=grasp, people=1, heldout_people=1, trials=2)
+    data = SetSettings(grasp=grasp, people=1, heldout_people=1, trials=2, heldout_trials=1)
     return Config(name="benchmark", engine=engine, data=data, demonstrations=str(demonstrations))
 
 

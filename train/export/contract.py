@@ -58,6 +58,8 @@ def make_contract(
             "action": "clip(network(scaled), -1, 1)",
             "residual": "smoothing * features[residual] + (1 - smoothing) * residual_scale * action",
             "command": "clip(controls[min(frame + 1, last frame)] + residual, low, high), held for the whole step",
+            "elsewhere": "follow_object: where the object is not where the demonstration has it at first, controls and "
+            "targets of the wrist go there and back, as mjx_hand/player/approach.py tells",
             "limit": OBSERVATION_LIMIT,
             "smoothing": task.smoothing,
             "residual_scale": [float(value) for value in policy.residual_scale],
@@ -66,6 +68,7 @@ def make_contract(
         },
         "rate": {"control_hz": 1 / (TIMESTEP * task.substeps), "substeps": task.substeps, "physics_step_s": TIMESTEP},
         "lookahead": list(task.lookahead),
+        "follow_object": task.follow_object,
         "object_kinds": list(OBJECT_KINDS),
         "inputs": [_input(feature, start) for feature, start in zip(table, starts, strict=True)],
         "outputs": [

@@ -72,7 +72,7 @@ class Config:
     part: str = "heldout"
     data: SetSettings = dataclasses.field(default_factory=lambda: SetSettings(grasp="pinch"))
     task: Task = dataclasses.field(default_factory=Task)
-    randomize: Randomize = dataclasses.field(default_factory=Randomize)
+    randomize: Randomize = dataclasses.field(default_factory=lambda: Randomize(share=1.0))
     ppo: Ppo = dataclasses.field(default_factory=Ppo)
     checks: Checks = dataclasses.field(default_factory=Checks)
     fresh: bool = False

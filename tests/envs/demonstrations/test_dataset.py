@@ -25,7 +25,7 @@ def assert_same(first, second):
 
 
 def test_a_set_holds_its_parts_and_says_how_it_was_made(set_path):
-    counts = {"train": SETTINGS.people * SETTINGS.trials, "heldout": SETTINGS.heldout_people * SETTINGS.trials}
+    counts = {"train": SETTINGS.people * SETTINGS.trials, "heldout": SETTINGS.heldout_people * SETTINGS.heldout_trials}
     for part in PARTS:
         assert len(load_part(set_path, part)) == counts[part]
         names = {p.name for p in (set_path / part).iterdir()}
@@ -137,7 +137,7 @@ def test_unknown_and_empty_parts_are_refused(set_path, tmp_path):
         load_part(tmp_path, "train")
 
 
-@pytest.mark.parametrize("name", ["people", "heldout_people", "trials"])
+@pytest.mark.parametrize("name", ["people", "trials", "heldout_people", "heldout_trials"])
 def test_sets_of_nothing_are_refused(name):
     with pytest.raises(InputError, match=rf"data.{name} is 0; it must be at least 1"):
         dataclasses.replace(SETTINGS, **{name: 0})
