@@ -26,16 +26,18 @@ from mjx_hand.motion import load_motion_file
 from mjx_hand.progress import clock
 from mjx_hand.retarget.sequence import RetargetErrors, retarget_errors, retarget_sequence, rigid_hand_of
 from mjx_hand.view.figures import plots
-from mjx_hand.view.report import Film, Headline, Plot, Report, Section, write_report
+from mjx_hand.view.report import Film, Headline, Plot, Report, Section, Table, write_report
 from train.evaluate import show
 from train.experiment.evaluate_seeds import POLICY, PRESS, REPLAY, ZERO, Results, evaluate_seeds, median_and_worst
 from train.experiment.setup import training_env
+from train.experiment.stress import BRIEF, stress
 from train.learning.curve import Point
 from train.ppo import train
 from train.reports.evaluation_page import TRACKING, headlines, tables, tracking_plot
 from train.reports.evaluation_record import write_results
 from train.reports.machine import processor
 from train.reports.published import PAPER
+from train.reports.stress_table import stress_table
 from train.settings.config import Config, command
 from train.view.video import film
 
@@ -64,11 +66,13 @@ def main(config: Config) -> None:
         by_seed = evaluate_seeds([config])
         write_results(by_seed, [config], {})
         results = by_seed[config.seed]
+    with _stage("under disturbances", timings):
+        disturbed = stress_table(stress([config], BRIEF))
     with _stage("video", timings):
         _, median = median_and_worst({config.seed: results.evaluations[POLICY]})["median"]
         video = film(results.env, results.rollouts[POLICY], median, out / "twin.mp4", _FILM)
-    write_report(out / "report.html", _report(config, errors, points, results, video, timings))
-    for table in tables(by_seed, config):
+    write_report(out / "report.html", _report(config, errors, points, results, disturbed, video, timings))
+    for table in [*tables(by_seed, config), disturbed]:
         show(table)
     print(f"\nreport: {(out / 'report.html').resolve()}  (open it in a browser)")
     print(f"all results: {out.resolve()}")
@@ -98,6 +102,7 @@ def _report(
     errors: dict[str, RetargetErrors],
     points: list[Point],
     results: Results,
+    disturbed: Table,
     video: Film,
     timings: list[tuple[str, float]],
 ) -> Report:
@@ -135,6 +140,7 @@ def _report(
             Section("Tracking error over time", [Plot(tracking_plot({config.seed: results}), TRACKING)]),
             Section("Success by every metric", [scores]),
             *([Section("Every grasp type", by_type)] if by_type else []),
+            Section("Under disturbances", [disturbed]),
             Section("How failures failed", [failures]),
             Section("From recorded rotations to hinges", [Plot(plots.joint_errors(joints, rotations), _PROJECTION)]),
             Section(

@@ -11,7 +11,14 @@ def arguments(config: Config, out: Path, **distributed: object) -> list[str]:
     values = {name: list(value) if isinstance(value, tuple) else value for name, value in ppo.items()}
     return [
         *(sys.executable, "-m", "train.ppo", f"out={out}", f"demonstrations={config.demonstrations}"),
-        *("name=tiny", "engine=native", "data.people=1", "data.heldout_people=1", "data.trials=1", "data.heldout_trials=1"),
+        *(
+            "name=tiny",
+            "engine=native",
+            "data.people=1",
+            "data.heldout_people=1",
+            "data.trials=1",
+            "data.heldout_trials=1",
+        ),
         f"checks.every={config.checks.every}",
         *(f"ppo.{name}={value}".replace(" ", "") for name, value in values.items()),
         *(f"distributed.{name}={value}" for name, value in distributed.items()),

@@ -38,6 +38,8 @@ ROWS: Mapping[str, Randomize] = {
     "targets 40 ms late": Randomize.only(delay=(2, 2)),
     HALF: dataclasses.replace(Randomize(share=0.5), variants=1, moved_share=1.0, push_prob=1.0),
 }
+# The few that tell most.
+BRIEF = ("mass × 1.5", "friction × 0.7", "moved 20 mm", "push 10 N, 0.2 s", HALF)
 # For curves: what is varied, and the rows by its value.
 CURVES: Mapping[str, Mapping[float, str]] = {
     "moved (mm)": {0.0: RECORDED, 5.0: "moved 5 mm", 10.0: "moved 10 mm", 20.0: "moved 20 mm", 40.0: "moved 40 mm"},
@@ -64,7 +66,7 @@ class Stress:
     part: str
 
 
-def stress(configs: Sequence[Config]) -> Stress:
+def stress(configs: Sequence[Config], rows: Sequence[str] = ()) -> Stress:
     """Roll out each seed's policy and the constant press under every row.
 
     The press is the strongest that searches on the training demonstrations find: as recorded, and disturbed as training
@@ -72,11 +74,12 @@ def stress(configs: Sequence[Config]) -> Stress:
 
     Args:
         configs: an experiment with one seed after the other, which names the part of the demonstrations.
+        rows: of `ROWS`; all if none is named.
 
     Raises:
         InputError: a seed without a checkpoint, or with one of another task.
     """
-    first, part = configs[0], configs[0].part
+    first, part, rows = configs[0], configs[0].part, rows or tuple(ROWS)
     recorded = load_env(first, part, ROWS[RECORDED])
     checkpoints = {
         config.seed: chosen_checkpoint(config, recorded.observation_size, recorded.action_size) for config in configs
@@ -84,7 +87,7 @@ def stress(configs: Sequence[Config]) -> Stress:
     policy = deterministic_policy(first.ppo, recorded.observation_size, recorded.action_size)
     policies: dict[str, dict[int, Evaluation]] = {}
     presses: dict[str, Evaluation] = {}
-    with counter(len(ROWS) + 1, "under disturbances (rows)") as advance:
+    with counter(len(rows) + 1, "under disturbances (rows)") as advance:
         press = constant_press(recorded)
         searched = [load_env(first, "train"), *([training_env(first)] if first.randomize.share else [])]
         known = [search_press(env, HOLD) for env in searched]
@@ -92,8 +95,8 @@ def stress(configs: Sequence[Config]) -> Stress:
         advance(1)
         # Compiled once: the rows' environments differ in their tables alone.
         learned, zero = (make_roll_out(recorded, act, HOLD) for act in (policy, zero_residual))
-        for row, randomize in ROWS.items():
-            tables = (recorded if row == RECORDED else load_env(first, part, randomize)).tables
+        for row in rows:
+            tables = (recorded if row == RECORDED else load_env(first, part, ROWS[row])).tables
             policies[row] = {
                 seed: evaluate_in(recorded, learned(checkpoint.policy, tables))
                 for seed, checkpoint in checkpoints.items()

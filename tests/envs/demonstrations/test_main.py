@@ -17,7 +17,14 @@ from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import load_demonstration, save_demonstration
 from tests.envs.conftest import SETTINGS
 
-ARGUMENTS = ["config=pinch", "data.people=2", "data.heldout_people=1", "data.trials=1", "data.heldout_trials=1", "data.seed=3"]
+ARGUMENTS = [
+    "config=pinch",
+    "data.people=2",
+    "data.heldout_people=1",
+    "data.trials=1",
+    "data.heldout_trials=1",
+    "data.seed=3",
+]
 
 
 def test_a_set_is_shown(set_path, set_root, capsys):

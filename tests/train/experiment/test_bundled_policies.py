@@ -1,6 +1,8 @@
 import dataclasses
 from pathlib import Path
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ import train.experiment.bundled_policies
 from envs.evaluation.evaluate import evaluate
 from envs.evaluation.roll_out import make_roll_out, zero_residual
 from mjx_hand.errors import InputError
+from mjx_hand.player.features import OBSERVATION_LIMIT
 from tools import bundle_policy
 from train.experiment.bundled_policies import bundled_env, bundled_policy
 from train.experiment.setup import chosen_checkpoint
@@ -67,3 +70,13 @@ def test_the_policies_that_come_along_do_what_the_zero_residual_does_not(name: s
     assert scores["tracking_error_cm"] < 0.5
     idle = evaluate(make_roll_out(env, zero_residual)(None), objects).rows()
     assert idle["tracking_error_cm"] > 2 * scores["tracking_error_cm"]
+
+
+@pytest.mark.parametrize("name", FIVE)
+def test_nothing_that_a_policy_sees_is_clipped_from_beginning_to_end(name: str):
+    config = compose([f"config={name}", "engine=native"])
+    env = bundled_env(config)
+    frames = jnp.arange(int(env.reference.length[0]))
+    observed = np.asarray(jax.jit(jax.vmap(lambda frame: env.start(jnp.asarray(0), frame).obs))(frames))
+    clipped = (np.abs(observed) >= OBSERVATION_LIMIT).all(axis=0)
+    assert not clipped.any(), np.flatnonzero(clipped)

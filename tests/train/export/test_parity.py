@@ -40,8 +40,8 @@ def inputs(policy: ExportedPolicy, exported: Path) -> Rows:
         rows.append(player.features())
         player.step()
     rng = np.random.default_rng(0)
-    around = np.array(rows)[rng.integers(len(rows), size=5000)] + 0.3 / policy.scale * rng.normal(size=(5000, 227))
-    anywhere = policy.offset + rng.uniform(-7, 7, (5000, 227)) / policy.scale
+    around = np.array(rows)[rng.integers(len(rows), size=5000)] + 0.3 / policy.scale * rng.normal(size=(5000, 225))
+    anywhere = policy.offset + rng.uniform(-7, 7, (5000, 225)) / policy.scale
     return np.concatenate([rows, around, anywhere]).astype(np.float32)
 
 
@@ -50,7 +50,7 @@ def wanted(included: Config, inputs: Rows, policy: ExportedPolicy) -> tuple[Rows
     """Brax's actions within their limits, and the residual by the environment's formula."""
     parameters = load_checkpoint(included.checkpoint).policy
     observation = np.clip((inputs - policy.offset) * policy.scale, -5, 5)
-    act = deterministic_policy(included.ppo, 227, 26)
+    act = deterministic_policy(included.ppo, 225, 26)
     action = np.clip(np.asarray(jax.jit(act)(parameters, observation)), -1, 1)
     scale = np.repeat([0.02, 0.10, 0.35], [3, 3, 20])
     return action, 0.9 * inputs[:, 52:78] + 0.1 * scale * action
@@ -70,7 +70,7 @@ def test_numpy(policy: ExportedPolicy, inputs: Rows, wanted: tuple[Rows, Rows]):
 def test_onnx(exported: Path, inputs: Rows, wanted: tuple[Rows, Rows], policy: ExportedPolicy):
     runtime = pytest.importorskip("onnxruntime", reason="the package onnxruntime is not installed: make setup")
     session = runtime.InferenceSession(exported / "policy.onnx", providers=["CPUExecutionProvider"])
-    assert [(i.name, i.shape) for i in session.get_inputs()] == [("features", ["batch", 227])]
+    assert [(i.name, i.shape) for i in session.get_inputs()] == [("features", ["batch", 225])]
     assert session.get_modelmeta().custom_metadata_map["digest"] == policy.digest
     check(session.run(["action", "residual"], {"features": inputs}), wanted)
     check(session.run(["action", "residual"], {"features": inputs[:1]}), (wanted[0][:1], wanted[1][:1]))
@@ -101,17 +101,17 @@ def test_c(exported: Path, tmp_path: Path, inputs: Rows, wanted: tuple[Rows, Row
 
 def test_c_of_a_policy_without_hidden_layers(policy: ExportedPolicy, tmp_path: Path):
     """And with whole numbers, which C would otherwise take for integers with a wrong suffix."""
-    kernel = np.zeros((227, 26), np.float32)
+    kernel = np.zeros((225, 26), np.float32)
     kernel[:26] = 2 * np.eye(26)
     plain = dataclasses.replace(
         policy,
         layers=(Layer(kernel, np.zeros(26, np.float32)),),
-        scale=np.ones(227, np.float32),
+        scale=np.ones(225, np.float32),
         offset=kernel[:, 0] * 0,
     )
     save_c(plain, tmp_path)
     step = compiled(tmp_path, tmp_path).policy_step
-    features = np.linspace(-0.6, 0.6, 227, dtype=np.float32)
+    features = np.linspace(-0.6, 0.6, 225, dtype=np.float32)
     action, residual = np.zeros((2, 26), np.float32)
     step(*(a.ctypes.data_as(ctypes.POINTER(ctypes.c_float)) for a in (features, action, residual)))
     np.testing.assert_allclose(action, np.clip(2 * features[:26], -1, 1), atol=1e-6)
@@ -128,4 +128,4 @@ def test_a_network_of_another_kind_is_refused(policy, included, monkeypatch):
 
 def test_layers_are_those_of_the_checkpoint(included):
     shapes = [layer.kernel.shape for layer in policy_layers(load_checkpoint(included.checkpoint).policy)]
-    assert shapes == [(227, 128), (128, 128), (128, 26)]
+    assert shapes == [(225, 128), (128, 128), (128, 26)]
