@@ -29,7 +29,7 @@ def test_the_hand_goes_where_the_object_went(seed):
     place, axes = world_from_hand(wrist + moved_wrist(wrist, base, centre, moved, np), base)
     before, axes_before = world_from_hand(wrist, base)
     turn = Rotation.from_rotvec([0, 0, 0.2])
-    assert_allclose(place, centre + [0.03, -0.02, 0] + turn.apply(before - centre), atol=1e-12)
+    assert_allclose(place, centre + np.array([0.03, -0.02, 0]) + turn.apply(before - centre), atol=1e-12)
     assert_allclose(axes, turn.as_matrix() @ axes_before, atol=1e-12)
     change = moved_wrist(wrist, base, centre, moved, np)
     assert np.abs(change[3:]).max() < np.pi  # turns go the short way
