@@ -165,8 +165,7 @@ class TrackingEnv(Env):
         they put the object elsewhere it starts at frame 0, whatever frame is asked for.
         """
         demonstration, frame = jnp.asarray(demonstration, jnp.int32), jnp.asarray(frame, jnp.int32)
-        physics = jax.tree.map(lambda table: table[demonstration, frame], self.tables.starts)
-        episode = None
+        physics, episode = jax.tree.map(lambda table: table[demonstration, frame], self.tables.starts), None
         if (tables := self.tables.disturbances) is not None:
             key = jax.random.fold_in(jax.random.key(0), demonstration) if rng is None else rng
             told = tables, self.reference, self.task.follow_object

@@ -120,11 +120,11 @@ class Player:
 
         None where that is the same, or the policy's task does not follow the object.
         """
-        if self._displacement is None:
+        moved = self._displacement
+        if moved is None:
             moved = displacement(self.data.qpos[-_FREE:], self.reference.object_pose[0].astype(float), np)
-            follows = self.policy.contract.get("follow_object", False)
-            self._displacement = moved * follows
-        return self._displacement if self._displacement.any() else None
+            moved = self._displacement = moved * bool(self.policy.contract.get("follow_object", False))
+        return moved if moved.any() else None
 
     def _followed(self, frame: int) -> Float[np.ndarray, "u"]:
         """What is added to the demonstrated targets at a frame, because the object stands elsewhere."""

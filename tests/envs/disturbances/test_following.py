@@ -14,7 +14,7 @@ from envs.tracking import TrackingEnv
 MOVED = Randomize.only(move=(0.04, 0.04), turn_deg=(15.0, 15.0))
 
 
-def wrist_in_object(rollouts, frame: np.ndarray) -> tuple[np.ndarray, Rotation]:
+def wrist_in_object(rollouts, frame: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The palm's first joints, and the hand's first direction, seen from where the object stood at first."""
     rows = np.arange(len(frame))
     turn = Rotation.from_quat(rollouts.object_pose[:, 0, 3:], scalar_first=True).inv()
