@@ -40,7 +40,7 @@ def evaluate_and_write(configs: Sequence[Config]) -> tuple[Path, tuple[Table, ..
     }
     out = write_results(results, configs, notes)
     if disturbed is not None:
-        write_stress(disturbed, out)
+        write_stress(disturbed, out, configs)
     write_report(out / "evaluation.html", evaluation_page(results, configs, shown, disturbed))
     return out, (*tables(results, configs[0]), *([] if disturbed is None else [stress_table(disturbed)]))
 

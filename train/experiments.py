@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from envs.demonstrations.dataset import make_missing_sets
 from envs.demonstrations.load_set import SEALED
@@ -15,6 +16,7 @@ from train.learning.curve import is_finished, load_curve
 from train.ppo import train
 from train.reports.evaluation_record import cached_results
 from train.reports.results_table import Experiment
+from train.reports.stress_table import cached_stress
 from train.settings.config import Config
 
 SEEDS = "seeds=[0,1,2]"
@@ -88,8 +90,8 @@ def measure(configs: Sequence[Config]) -> Experiment:
     """Train and evaluate one experiment; what was done before with the same settings is taken as it is."""
     finished = all(_is_finished(config) for config in configs)
     folder = shared_folder(configs)
-    summary = cached_results(configs) if finished and not configs[0].fresh else None
-    if summary is None:
+    known = _known(configs) if finished and not configs[0].fresh else None
+    if known is None:
         data, root = configs[0].data, configs[0].demonstrations
         make_missing_sets(data, root)
         if configs[0].part == SEALED:
@@ -98,9 +100,16 @@ def measure(configs: Sequence[Config]) -> Experiment:
         for config in configs:
             train(config, env)
         evaluate_and_write(configs)
-        summary = cached_results(configs)
-        if summary is None:
+        known = _known(configs)
+        if known is None:
             raise InputError(f"{folder}: policies changed while they were evaluated; run one command at a time there")
     else:
         print(f"trained and evaluated already ({folder}); anew with fresh=true")
-    return Experiment(configs[0].name, folder, summary, {c.seed: load_curve(c.out) for c in configs})
+    summary, disturbed = known
+    return Experiment(configs[0].name, folder, summary, {c.seed: load_curve(c.out) for c in configs}, disturbed)
+
+
+def _known(configs: Sequence[Config]) -> tuple[Mapping[str, Any], Mapping[str, Any] | None] | None:
+    """What an evaluation of these very policies left on disk, under disturbances too if that is asked for."""
+    summary, disturbed = cached_results(configs), cached_stress(configs) if configs[0].stress else None
+    return None if summary is None or (configs[0].stress and disturbed is None) else (summary, disturbed)

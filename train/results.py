@@ -5,8 +5,8 @@
 Without `names` the paper's five grasp types; any experiment of `configs/config` may be named. Overrides, such as
 `ppo.num_timesteps=300000`, hold for all of them. Writes `index.html`, `results.md` and `results.json` to `results`
 (outputs/results) after each experiment. Grasp types are measured on their sealed part, which is made for that alone;
-`part=heldout` names another. What was trained and evaluated before with the same settings is kept, so that the same
-command goes on where it was stopped.
+`part=heldout` names another. Policies are tested under disturbances as well, unless `stress=false` is given. What was
+trained and evaluated before with the same settings is kept, so that the same command goes on where it was stopped.
 """
 
 import dataclasses
@@ -53,6 +53,8 @@ def plan(argv: Sequence[str]) -> tuple[list[list[Config]], Path]:
     own, overrides = taken(argv, ("names", "results"))
     if not any(a.startswith(("seed=", "seeds=")) for a in overrides):
         overrides.append(SEEDS)
+    if not any(a.startswith("stress=") for a in overrides):
+        overrides.append("stress=true")
     experiments = [compose_seeds([f"config={name}", *overrides]) for name in listed(own, "names", FIVE)]
     if not any(a.startswith("part=") for a in overrides):
         experiments = [[dataclasses.replace(c, part=_part(c)) for c in configs] for configs in experiments]

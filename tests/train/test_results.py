@@ -1,5 +1,6 @@
 """The results of several experiments, from what their evaluations left on disk; nothing is trained here."""
 
+import dataclasses
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,6 +18,7 @@ from train.reports.evaluation_record import evaluation_fingerprint
 from train.reports.published import PAPER
 from train.reports.results_page import write_results_page
 from train.reports.results_table import FIVE, Experiment, failures_table, results_table
+from train.reports.stress_summary import stress_summary
 from train.settings.config import Config
 from train.settings.options import Checks, Ppo
 
@@ -112,6 +114,27 @@ def test_what_is_put_down_has_no_hold():
         del scores["hold"]
     table = results_table([down, experiment("pinch", [1.0])])
     assert [row(table, name)["held 5 s"] for name in ("mustard", "pinch", "mean")] == ["", "90.0 %", ""]
+
+
+def test_disturbances_stand_beside_each_other_where_all_were_tested():
+    def tested(policy: float, press: float) -> dict[str, Any]:
+        shares = {"policy": {"kept": policy}, "constant press": {"kept": press}}
+        return {"rows": {"as recorded": shares, "mass × 2": {**shares, "policy": {"kept": policy - 0.5}}}}
+
+    pair = [
+        dataclasses.replace(experiment("pinch", [1.0]), stress=tested(1.0, 0.5)),
+        dataclasses.replace(experiment("power", [1.0]), stress=tested(0.9, 0.8)),
+    ]
+    table = stress_summary(pair)
+    assert table is not None
+    assert row(table, "mass × 2") == {
+        "disturbance": "mass × 2",
+        "pinch": "50.0 / 50.0",
+        "power": "40.0 / 80.0",
+        "mean": "45.0 / 65.0",
+    }
+    assert stress_summary([*pair, experiment("lateral", [1.0])]) is None
+    assert stress_summary(pair[:1]).columns == ("disturbance", "pinch")  # type: ignore[union-attr]
 
 
 def test_seeds_that_never_learned_are_told_apart():
@@ -227,6 +250,10 @@ def work(monkeypatch, tmp_path) -> list[str]:
         done.append(f"evaluate {configs[0].name}")
         content = summary(configs[0].data.grasp, [1.0] * len(configs)) | {"made_of": evaluation_fingerprint(configs)}
         (Path(configs[0].out).parent / "evaluation.json").write_text(json.dumps(content))
+        kept = {"policy": {"kept": 1.0}, "constant press": {"kept": 0.5}}
+        content = {"rows": {"as recorded": kept}, "made_of": evaluation_fingerprint(configs)}
+        if configs[0].stress:
+            (Path(configs[0].out).parent / "stress.json").write_text(json.dumps(content))
 
     monkeypatch.setattr(experiments, "training_env", lambda config: None)
     monkeypatch.setattr(experiments, "make_missing_sets", lambda data, root, sealed=False: None)
@@ -240,6 +267,7 @@ def test_what_is_done_is_kept_and_the_rest_goes_on(work: list[str], capsys):
     few = ["seeds=[0,1]", "ppo.num_timesteps=1000"]
     assert results.main(["names=[pinch]", *few]) == 0
     assert work == ["train pinch 0", "train pinch 1", "evaluate pinch"]
+    assert "| as recorded | 100.0 / 50.0 |" in Path("outputs/results/results.md").read_text()
     work.clear()
     assert results.main(["names=[pinch,lateral]", *few]) == 0
     assert work == ["train lateral 0", "train lateral 1", "evaluate lateral"]
@@ -247,6 +275,10 @@ def test_what_is_done_is_kept_and_the_rest_goes_on(work: list[str], capsys):
     work.clear()
     assert results.main(["names=[pinch]", "seeds=[0,1]", "ppo.num_timesteps=2000"]) == 0
     assert work[-1] == "evaluate pinch", "other settings are another experiment"
+    work.clear()
+    Path("outputs/pinch/stress.json").unlink()
+    assert results.main(["names=[pinch]", "seeds=[0,1]", "ppo.num_timesteps=2000"]) == 0
+    assert work[-1] == "evaluate pinch", "a stress test is missing"
     work.clear()
     assert results.main(["names=[pinch]", "seeds=[0,1]", "ppo.num_timesteps=2000", "fresh=true"]) == 0
     assert work == ["train pinch 0", "train pinch 1", "evaluate pinch"]

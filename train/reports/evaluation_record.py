@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from envs.demonstrations.load_set import PARTS, part_digest
-from envs.demonstrations.set_settings import fingerprint, set_folder
+from envs.demonstrations.load_set import PARTS, SEALED, part_digest
+from envs.demonstrations.set_settings import fingerprint, sealed_folder, set_folder
 from envs.evaluation.evaluate import Evaluation
 from envs.evaluation.people import people_of, person_scores
 from envs.grasps import grasp_names, grasp_type
@@ -95,15 +95,19 @@ def rollout_rows(evaluation: Evaluation, names: Sequence[str]) -> Iterator[list[
 
 def cached_results(configs: Sequence[Config]) -> dict[str, Any] | None:
     """The summary of an evaluation of the very same policies with the same settings, None where there is none."""
-    path = shared_folder(configs) / "evaluation.json"
+    summary = made_of(shared_folder(configs) / "evaluation.json", configs)
+    return summary if summary and summary.get("films") else None
+
+
+def made_of(path: Path, configs: Sequence[Config]) -> dict[str, Any] | None:
+    """What a file of results says, if it is of the very same policies with the same settings; else None."""
     if not path.is_file():
         return None
     try:
-        summary = json.loads(path.read_text())
+        content = json.loads(path.read_text())
     except (ValueError, RecursionError):  # a file of someone else's: it is written anew
         return None
-    same = isinstance(summary, dict) and summary.get("made_of") == evaluation_fingerprint(configs)
-    return summary if same and summary.get("films") else None
+    return content if isinstance(content, dict) and content.get("made_of") == evaluation_fingerprint(configs) else None
 
 
 def evaluation_fingerprint(configs: Sequence[Config]) -> str:
@@ -112,7 +116,8 @@ def evaluation_fingerprint(configs: Sequence[Config]) -> str:
     for config in configs:
         parts = [fingerprint(config.data)]
         parts += [dataclasses.asdict(part) for part in (config.task, config.ppo, config.checks)]
-        sets = [set_folder(settings, config.demonstrations).name for settings in config.data.expand_types()]
+        folder = sealed_folder if config.part == SEALED else set_folder
+        sets = [folder(settings, config.demonstrations).name for settings in config.data.expand_types()]
         if config.data.folder:
             sets += [part_digest(config.data.folder, part) for part in PARTS]
         forces = [grasp_type(name).grip_force for name in grasp_names()]

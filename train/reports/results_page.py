@@ -17,6 +17,7 @@ from train.learning.curve import LEARNED
 from train.reports.machine import machine
 from train.reports.published import PAPER
 from train.reports.results_table import Experiment, failures_table, minutes_of, results_table
+from train.reports.stress_summary import stress_summary
 
 SCHEMA = "mjx-hand/results/1"
 PACKAGES = ("mjx-hand", "mujoco", "mujoco-mjx", "jax", "brax")
@@ -50,7 +51,7 @@ def write_results_page(experiments: Sequence[Experiment], waiting: Sequence[str]
 
 
 def _page(experiments: Sequence[Experiment], waiting: Sequence[str], command: str) -> Report:
-    table, failures = results_table(experiments), failures_table(experiments)
+    table, failures, disturbed = _tables(experiments)
     last = dict(zip(table.columns, table.rows[-1], strict=True))
     hardware, packages = machine(*PACKAGES)
     return Report(
@@ -69,6 +70,7 @@ def _page(experiments: Sequence[Experiment], waiting: Sequence[str], command: st
         ),
         sections=(
             Section("Every experiment", [table]),
+            *([Section("Under disturbances", [disturbed])] if disturbed else []),
             Section("Learning", [_curves(experiment) for experiment in experiments]),
             Section("Demonstration and twin", [film for experiment in experiments for film in _films(experiment)]),
             Section("How failures failed", [_shares(experiments)]),
@@ -78,6 +80,11 @@ def _page(experiments: Sequence[Experiment], waiting: Sequence[str], command: st
         + [("this machine", hardware), ("versions", packages)],
         commands=[command],
     )
+
+
+def _tables(experiments: Sequence[Experiment]) -> tuple[Table, Table, Table | None]:
+    """Scores, failures, and what disturbances do."""
+    return results_table(experiments), failures_table(experiments), stress_summary(experiments)
 
 
 def _curves(experiment: Experiment) -> Plot:
@@ -130,8 +137,10 @@ def _beside(paper: str) -> str:
 
 
 def _markdown(experiments: Sequence[Experiment], waiting: Sequence[str], folder: Path, command: str) -> str:
-    table, failures = results_table(experiments), failures_table(experiments)
+    table, failures, disturbed = _tables(experiments)
     lines = ["# Results", "", _TASK, "", *markdown_rows(table), "", table.note, ""]
+    if disturbed:
+        lines += ["## Under disturbances", "", *markdown_rows(disturbed), "", disturbed.note, ""]
     if waiting:
         lines += [f"Not done yet: {', '.join(waiting)}.", ""]
     lines += ["## How failures failed", "", *markdown_rows(_shares(experiments)), ""]
@@ -171,6 +180,7 @@ def _json(experiments: Sequence[Experiment]) -> dict[str, object]:
             "curves": {seed: [dataclasses.asdict(p) for p in points] for seed, points in experiment.curves.items()},
             "minutes_to_learn": learned,
             "minutes_of_training": total,
+            "stress": experiment.stress,
         }
     return {
         "schema": SCHEMA,

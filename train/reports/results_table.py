@@ -25,12 +25,14 @@ class Experiment:
         folder: of its evaluation.
         summary: what `evaluation.json` says.
         curves: the evaluations while training, by seed.
+        stress: what `stress.json` says; None where it was not asked for.
     """
 
     name: str
     folder: Path
     summary: Mapping[str, Any]
     curves: Mapping[int, Sequence[Point]]
+    stress: Mapping[str, Any] | None = None
 
     @property
     def paper(self) -> Published | None:

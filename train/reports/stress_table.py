@@ -4,6 +4,7 @@ import csv
 import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -12,10 +13,11 @@ from envs.evaluation.evaluate import Evaluation
 from mjx_hand.files.npz_archive import replacing
 from mjx_hand.view.figures.stress_figure import shares_over
 from mjx_hand.view.report import Table
-from train.experiment.evaluate_seeds import PART_WORDS, POLICY, PRESS
+from train.experiment.evaluate_seeds import PART_WORDS, POLICY, PRESS, shared_folder
 from train.experiment.stress import CURVES, Stress
-from train.reports.evaluation_record import mean_scores, rollout_rows
+from train.reports.evaluation_record import evaluation_fingerprint, made_of, mean_scores, rollout_rows
 from train.reports.interval import wilson
+from train.settings.config import Config
 
 SCHEMA = "mjx-hand/stress/1"
 _SCORES = {"CHORD": "chord", "held": "hold", "ManipTrans": "manip_trans_object"}
@@ -54,7 +56,7 @@ def stress_figure(stress: Stress) -> Figure:
     return shares_over(panels)
 
 
-def write_stress(stress: Stress, folder: Path) -> None:
+def write_stress(stress: Stress, folder: Path, configs: Sequence[Config]) -> None:
     """Write `stress.json` (a share and its interval for each row) and `stress.csv` (every rollout)."""
     rows = {
         row: {
@@ -64,7 +66,13 @@ def write_stress(stress: Stress, folder: Path) -> None:
         }
         for row, policies in stress.policies.items()
     }
-    content = {"schema": SCHEMA, "part": stress.part, "constant_press": dict(stress.strengths), "rows": rows}
+    content = {
+        "schema": SCHEMA,
+        "part": stress.part,
+        "constant_press": dict(stress.strengths),
+        "rows": rows,
+        "made_of": evaluation_fingerprint(configs),
+    }
     with replacing(folder / "stress.json") as temporary:
         temporary.write_text(json.dumps(content, indent=1) + "\n")
     with replacing(folder / "stress.csv") as temporary, temporary.open("w", newline="") as file:
@@ -74,6 +82,11 @@ def write_stress(stress: Stress, folder: Path) -> None:
         for row, policies in stress.policies.items():
             for column, seed, e in [*((POLICY, s, e) for s, e in policies.items()), (PRESS, "", stress.press[row])]:
                 written.writerows([row, column, seed, *cells] for cells in rollout_rows(e, names))
+
+
+def cached_stress(configs: Sequence[Config]) -> dict[str, Any] | None:
+    """What `stress.json` says of the very same policies with the same settings, None where there is none."""
+    return made_of(shared_folder(configs) / "stress.json", configs)
 
 
 def _told(evaluations: Sequence[Evaluation]) -> Mapping[str, float]:
