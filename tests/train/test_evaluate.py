@@ -206,6 +206,7 @@ def test_the_command_takes_the_settings_of_the_run(trained: Trained, tiny: Confi
     with pytest.raises(InputError, match=r"holds a training with name=tiny, now pinch"):
         settled(other, ["out", "config"])
     assert settled(dataclasses.replace(other, engine="mjx"), ["out", "engine"]).engine == "mjx"
+    assert settled(dataclasses.replace(other, part="sealed"), ["out", "part"]).part == "sealed"
     assert settled(dataclasses.replace(other, out=str(tmp_path / "gone")), ["out"]).name == "pinch"
 
 

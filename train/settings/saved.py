@@ -32,6 +32,7 @@ _FREE = (
     "distributed",
     "debug",
     "stress",
+    "part",
     "play",
     "export",
     "checks",

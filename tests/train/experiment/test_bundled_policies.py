@@ -13,7 +13,7 @@ from mjx_hand.errors import InputError
 from mjx_hand.player.features import OBSERVATION_LIMIT
 from tools import bundle_policy
 from train.experiment.bundled_policies import bundled_env, bundled_policy
-from train.experiment.setup import chosen_checkpoint
+from train.experiment.setup import chosen_checkpoint, settled
 from train.learning.checkpoint import load_checkpoint
 from train.learning.curve import Point
 from train.learning.policy import deterministic_policy
@@ -60,7 +60,7 @@ def test_without_one_the_command_that_trains_is_named(untrained: Config):
 def test_the_policies_that_come_along_do_what_the_zero_residual_does_not(name: str):
     """On the demonstration beside each, from frame 0, and still there five seconds later."""
     config = compose([f"config={name}", "engine=native"])
-    config = dataclasses.replace(config, checkpoint=str(bundled_policy(name)))
+    config = settled(dataclasses.replace(config, checkpoint=str(bundled_policy(name))), ())
     env = bundled_env(config)
     checkpoint = chosen_checkpoint(config, env.observation_size)
     policy = deterministic_policy(config.ppo, env.observation_size, env.action_size)
