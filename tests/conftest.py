@@ -1,5 +1,6 @@
 """What all tests share: shape checks at run time, kept compilations, off-screen rendering, real recordings."""
 
+import gc
 import os
 import sys
 from pathlib import Path
@@ -12,8 +13,9 @@ if sys.platform == "linux":
     os.environ.setdefault("MUJOCO_GL", "egl")
 
 # Before JAX's first import, and for the processes that tests start: they spend more time compiling than running what is
-# compiled, so that it is not worth optimising.
-os.environ["XLA_FLAGS"] = " ".join(filter(None, (os.environ.get("XLA_FLAGS"), "--xla_backend_optimization_level=0")))
+# compiled, so that it is not worth optimising. XLA's older emitters make code in 40 % of the newer ones' time.
+_QUICK = ("--xla_backend_optimization_level=0", "--xla_cpu_use_fusion_emitters=false")
+os.environ["XLA_FLAGS"] = " ".join(filter(None, (os.environ.get("XLA_FLAGS"), *_QUICK)))
 
 # Before any of these packages is imported: every signature's shapes and types are then checked as the tests run.
 install_import_hook(["mjx_hand", "envs", "train", "tools"], "beartype.beartype")
@@ -23,6 +25,12 @@ from mjx_hand.compile_cache import enable_compile_cache  # noqa: E402
 enable_compile_cache()
 
 ROOT = Path(__file__).resolve().parent.parent
+
+
+def pytest_collection_finish() -> None:
+    """What is imported stays to the end: the collector need not go through it again and again."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")
