@@ -4,6 +4,7 @@ import gc
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from jaxtyping import install_import_hook
@@ -25,6 +26,27 @@ from mjx_hand.compile_cache import enable_compile_cache  # noqa: E402
 enable_compile_cache()
 
 ROOT = Path(__file__).resolve().parent.parent
+
+
+# What each of these folders shares (sets, an environment, a training) takes most of a minute to make.
+SHARING = ("tests/train/", "tests/envs/")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """`--dist loadfile`, but two workers take one of the folders each, so that nothing is made by both.
+
+    Larger pieces of work come first: single files are left to even out what the workers take.
+    """
+    if config.getvalue("dist") != "loadfile" or len(config.getvalue("tx")) != 2:
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    class FoldersScheduling(LoadFileScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return next((folder for folder in SHARING if nodeid.startswith(folder)), super()._split_scope(nodeid))
+
+    return FoldersScheduling(config, log)
 
 
 def pytest_collection_finish() -> None:
