@@ -30,7 +30,7 @@ _SAME_FOR_ALL = "checks.stop_at=2.0"  # never: a training that stopped early wou
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """An experiment's variants, each with a configuration a seed."""
+    """An experiment's variants, each with one configuration per seed."""
 
     name: str
     variants: Sequence[tuple[Variant, Sequence[Config]]]
