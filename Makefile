@@ -4,7 +4,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 PIP_FLAGS := --quiet --disable-pip-version-check
-# A file's tests stay with one worker: they share hands and compiled functions.
+# A file's tests stay with one worker: they share hands and compiled functions. Of two workers, one takes all of
+# tests/train and the other all of tests/envs first (tests/conftest.py): each folder shares sets and a training.
 WORKERS ?= 2
 # The environment of the newest Python here, and the Warp that pyproject.toml names.
 NEWEST := .venv-newest

@@ -3,6 +3,10 @@
 A recording shows where fingers are, not how hard they press: replayed alone it drops the object. The offsets follow
 from the demonstration and the object's shape alone, without simulation. Added to the reference they hold some objects
 for some time; the policy's residual does the rest.
+
+The same press is computed in two more places, each from other contacts: `envs.model_grip` for any body from the C
+engine's distances between its geoms, which are no capsules, and `envs.live.twin.grip` for one state in real time from
+the engine's own list of contacts. What trained policies rely on is this one, to the bit.
 """
 
 import jax

@@ -3,10 +3,10 @@
     mjx-hand ablations [names=[spherical]] [variants=["no grip"]] [results=FOLDER] [any override of train.ppo]
 
 Trains and evaluates every variant of `train/reports/ablations_variants.py`, or those of `variants`, of the experiments
-of `names` (spherical, the hardest), 300,000 control steps a training unless ppo.num_timesteps says otherwise. Overrides
-hold for all variants alike. Writes `index.html`, `ablations.md` and `ablations.json` to `results` (outputs/ablations)
-after each variant, and trainings below it. What was done before with the same settings is kept, so that the same
-command goes on where it was stopped.
+of `names` (spherical, the hardest), 300,000 control steps per training unless ppo.num_timesteps says otherwise.
+Overrides hold for all variants alike. Writes `index.html`, `ablations.md` and `ablations.json` to `results`
+(outputs/ablations) after each variant, and trainings below it. What was done before with the same settings is kept, so
+that the same command resumes where it was stopped.
 """
 
 import dataclasses
@@ -30,7 +30,7 @@ _SAME_FOR_ALL = "checks.stop_at=2.0"  # never: a training that stopped early wou
 
 @dataclasses.dataclass(frozen=True)
 class Plan:
-    """An experiment's variants, each with a configuration a seed."""
+    """An experiment's variants, each with one configuration per seed."""
 
     name: str
     variants: Sequence[tuple[Variant, Sequence[Config]]]

@@ -2,11 +2,11 @@
 
 Every rollout counts, from frame 0, unassisted. Beside the policies, the best of each seed, stand baselines without
 learning: one constant press for each grasp type, the reference with a residual of zero, and the demonstration replayed
-as it is. Writes `evaluation.html`, `evaluation.json`, `evaluation.csv` (a row a rollout), `worst.mp4` and `median.mp4`
-to the seed's `out` folder, or to the one above those of several seeds.
+as it is. Writes `evaluation.html`, `evaluation.json`, `evaluation.csv` (one row per rollout), `worst.mp4` and
+`median.mp4` to the seed's `out` folder, or to the one above those of several seeds.
 
 With `stress=true` also under disturbances that the policy is not told of (`train.experiment.stress`): a table and
-curves on the page, `stress.json` and `stress.csv` (a row a rollout).
+curves on the page, `stress.json` and `stress.csv` (one row per rollout).
 """
 
 from collections.abc import Sequence

@@ -1,8 +1,8 @@
 """Play a policy in the browser, in real time: `mjx-hand play config=pinch`.
 
 Shows a held-out demonstration, its twin under the policy, the object, and the error. `play.demonstration=3` chooses
-one; without it, the one of median tracking error. What has not been trained here is played by the policy that comes
-with the project, on the demonstration beside it, where there is one. `play.unstable=FILE` shows a simulation that
+one; without it, the one of median tracking error. What has not been trained here is played by the bundled policy,
+on the demonstration bundled with it, where there is one. `play.unstable=FILE` shows a simulation that
 diverged in training instead: the state before the step, and each physics step of it that the engine could make.
 """
 

@@ -1,8 +1,8 @@
 """Train a residual tracking policy with Brax PPO: `mjx-hand train config=pinch ppo.num_envs=512 seed=3`.
 
-Writes to the experiment's `out` folder: `best.npz` and `last.npz` (policies), `state/` (all it takes to go on),
-`curve.csv` (evaluations), `config.yaml`, and TensorBoard logs. A training that was stopped, killed even, goes on from
-its last state when the same command is given again, and ends as it would have ended.
+Writes to the experiment's `out` folder: `best.npz` and `last.npz` (policies), `state/` (all that resuming takes),
+`curve.csv` (evaluations), `config.yaml`, and TensorBoard logs. A training that was stopped, even killed, resumes from
+its last state when the same command is run again, and ends as it would have ended.
 """
 
 import dataclasses

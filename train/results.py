@@ -6,7 +6,7 @@ Without `names` the paper's five grasp types; any experiment of `configs/config`
 `ppo.num_timesteps=300000`, hold for all of them. Writes `index.html`, `results.md` and `results.json` to `results`
 (outputs/results) after each experiment. Grasp types are measured on their sealed part, which is made for that alone;
 `part=heldout` names another. Policies are tested under disturbances as well, unless `stress=false` is given. What was
-trained and evaluated before with the same settings is kept, so that the same command goes on where it was stopped.
+trained and evaluated before with the same settings is kept, so that the same command resumes where it was stopped.
 """
 
 import dataclasses

@@ -1,11 +1,11 @@
 """Demonstrations from disk: sets that the project made, and anyone's finished demonstrations."""
 
-import hashlib
 from pathlib import Path
 
 from envs.demonstrations.set_settings import GIVEN, SetSettings, sealed_folder, set_folder
 from envs.grasps import grasp_names
 from mjx_hand.errors import InputError
+from mjx_hand.files.digests import digest, file_piece
 from mjx_hand.motion.demonstration import Demonstration, load_demonstration
 
 PARTS = ("train", "heldout")
@@ -80,7 +80,4 @@ def part_digest(folder: str | Path, part: str) -> str:
     Raises:
         InputError: as `demonstration_files`.
     """
-    content = hashlib.sha256()
-    for path in demonstration_files(folder, part):
-        content.update(path.name.encode() + hashlib.sha256(path.read_bytes()).digest())
-    return content.hexdigest()[:16]
+    return digest(map(file_piece, demonstration_files(folder, part)))[:16]

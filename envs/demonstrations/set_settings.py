@@ -1,8 +1,6 @@
 """`SetSettings`: what a demonstration set holds, and where it is kept."""
 
 import dataclasses
-import hashlib
-import json
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +10,7 @@ from envs.demonstrations.scripted.simulated_capture import CaptureSettings
 from envs.grasps import grasp_names, grasp_type
 from envs.grip_force import RECORDED
 from mjx_hand.errors import InputError
+from mjx_hand.files.digests import json_digest
 from mjx_hand.objects.mesh_file import mesh_digest
 
 ALL = "all"
@@ -116,7 +115,7 @@ def set_folder(settings: SetSettings, root: str | Path) -> Path:
         ingredients = [_RECORDED_VERSION, settings.seed, recording, recording_digest(settings.recording.path)]
     else:
         ingredients.append(_performed(settings.grasp))
-    return Path(root) / f"{settings.grasp}-{_digest(ingredients)[:10]}"
+    return Path(root) / f"{settings.grasp}-{json_digest(ingredients)[:10]}"
 
 
 def sealed_folder(settings: SetSettings, root: str | Path) -> Path:
@@ -133,12 +132,12 @@ def sealed_folder(settings: SetSettings, root: str | Path) -> Path:
     told = fingerprint(settings)
     told |= {"people": settings.sealed_people, "trials": settings.sealed_trials}
     del told["heldout_people"], told["heldout_trials"]
-    return Path(root) / f"{settings.grasp}-sealed-{_digest([_VERSION, told, _performed(settings.grasp)])[:10]}"
+    return Path(root) / f"{settings.grasp}-sealed-{json_digest([_VERSION, told, _performed(settings.grasp)])[:10]}"
 
 
 def sealed_seed(settings: SetSettings) -> int:
     """The seed of a type's sealed part, far from those of the other parts and of other types."""
-    return int(_digest(["sealed", settings.seed, settings.grasp])[:8], 16)
+    return int(json_digest(["sealed", settings.seed, settings.grasp])[:8], 16)
 
 
 def _performed(grasp: str) -> dict[str, Any]:
@@ -146,10 +145,6 @@ def _performed(grasp: str) -> dict[str, Any]:
     performed = dataclasses.asdict(grasp_type(grasp))
     del performed["grip_force"]  # it is the twin's: the same demonstrations are made whatever it is
     return performed
-
-
-def _digest(ingredients: Any) -> str:
-    return hashlib.sha256(json.dumps(ingredients, sort_keys=True).encode()).hexdigest()
 
 
 def fingerprint(settings: SetSettings) -> dict[str, Any]:

@@ -27,7 +27,7 @@ def twins(demonstrations: Sequence[Demonstration]) -> list[RigidHand]:
 
 
 def _arrays(hands: Sequence[RigidHand]) -> dict[str, np.ndarray]:
-    """Every field, a row a hand, or a row of `field.LINK` for each link; hands of one model have the same sizes."""
+    """Every field, one row per hand, or a row of `field.LINK` for each link; hands of one model have the same sizes."""
     arrays = {}
     for field in dataclasses.fields(RigidHand):
         values = [getattr(hand, field.name) for hand in hands]

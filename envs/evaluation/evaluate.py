@@ -1,4 +1,4 @@
-"""`evaluate`: all metrics of a set of rollouts, a number a rollout and a row a metric."""
+"""`evaluate`: all metrics of a set of rollouts, one number per rollout and one row per metric."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence

@@ -164,9 +164,9 @@ def _greet(source: str, host: str, port: int, token: str, secure: bool, frames: 
     if isinstance(frames, Datagrams):
         _say(f"messages go to {frames.name}")
     if is_public(host):
-        _say(f"warning: everybody who can reach this computer at {host} and knows the token can look and drive")
+        _say(f"warning: anyone who can reach this computer at {host} and knows the token can watch and control it")
     if is_public(host) and isinstance(frames, Datagrams):
-        _say("warning: UDP has no token: everybody who can reach that port can drive the hand")
+        _say("warning: UDP has no token: anyone who can reach that port can control the hand")
 
 
 def _say(text: str) -> None:

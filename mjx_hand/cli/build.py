@@ -36,8 +36,8 @@ def build(
         shape: shape coefficients, unit variance each; none is the mean hand.
         side: which hand.
         mano: a licensed MANO file (MANO_RIGHT.pkl, MANO_LEFT.pkl or .npz); without it, the open hand.
-        wrist_joints: put six movable joints between the world and the wrist.
-        collision: shapes that touch: capsules, or the convex hull of each link.
+        wrist_joints: add six joints that move the wrist: three slides and three turns.
+        collision: collision shapes: capsules, or the convex hull of each link.
         report: measure how far the rigid links' skin lies from the blended skin, in postures from fist to spread
             fingers: a table here, skin_error.csv and skin_error.png in the folder.
         motion: a recording whose postures the report measures too.

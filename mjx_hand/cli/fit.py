@@ -47,7 +47,7 @@ def fit(
 
     Args:
         recording: markers in a format of mjx_hand/capture/marker_files: .c3d, .trc, .tsv, .csv or .npz.
-        markers: the marker set: a YAML file, or an included set, hand22 or glove13.
+        markers: the marker set: a YAML file, or a bundled one, hand22 or glove13.
         out: the .npz to write: a motion, which `mjx-hand retarget` reads.
         side: which hand.
         plot: a picture to write (.png, .svg, .pdf): the fitted hand with its markers, and each marker's error.

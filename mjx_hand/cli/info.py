@@ -17,9 +17,9 @@ def info(
     fps: float | None = None,
     units: str | None = None,
 ) -> int:
-    """Say what a file or dataset folder is, what it holds, and what to run next.
+    """Describe a file or dataset folder: what it is, what it holds, and what to run next.
 
-    The exit status is 1 for a dataset's recording that cannot be read as it is: what is said is why.
+    The exit status is 1 for a dataset's recording that cannot be read as it is; the output says why.
 
     Args:
         file: anything that mjx-hand reads or writes.

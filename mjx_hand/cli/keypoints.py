@@ -28,7 +28,7 @@ def keypoints(
     own_bones: bool = False,
     mano: Path | None = None,
 ) -> None:
-    """Make a motion of hand keypoints: bone lengths give the shape, bone directions the rotations.
+    """Turn hand keypoints into a motion: bone lengths give the shape, bone directions the rotations.
 
     Args:
         recording: keypoints of MediaPipe, Leap, WebXR, OpenXR, ARKit, MRTK or Quest: .json, .csv, .npz and their like.

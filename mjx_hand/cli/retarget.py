@@ -44,9 +44,9 @@ def retarget(
     sequence: str | None = None,
     fps: float | None = None,
 ) -> int:
-    """Bring a recorded motion, or a folder of them, onto the 20 hinges of the rigid hand and report the errors.
+    """Retarget a recorded motion, or a folder of them, to the 20 hinges of the rigid hand and report the errors.
 
-    A folder's recordings go to files of the same names below `out`, beside summary.csv. A run that was stopped goes on
+    A folder's recordings go to files of the same names below `out`, beside summary.csv. A run that was stopped resumes
     where it was; a file that cannot be used is reported, the rest is done, and the exit status is 1.
 
     Args:
@@ -179,7 +179,7 @@ def _folder(
     if failed:
         more = f", {len(failed) - _SHOWN} of them not shown here" if len(failed) > _SHOWN else ""
         print(f"{len(failed)} of {len(outcomes)} recordings could not be used{more}; exit status 1")
-    print(f"{out / SUMMARY}  one row a recording")
+    print(f"{out / SUMMARY}  one row per recording")
     return 1 if failed else 0
 
 

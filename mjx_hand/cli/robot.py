@@ -40,7 +40,7 @@ def robot(
     absent_meshes: Literal["refuse", "bones"] = "refuse",
     self_collision: bool = False,
 ) -> None:
-    """Move a robot hand as a person's hand moved; or with --build write the robot hand as a model for simulation.
+    """Retarget a recording to a robot hand; or, with --build, write the robot hand as a model for simulation.
 
     Args:
         recording: keypoints (.json, .npz or .csv) or a motion of any format that mjx-hand retarget reads.
@@ -49,17 +49,17 @@ def robot(
         robot: its description: a name in mjx_hand/robots/descriptions, or the path of a file like those.
         out: the .npz to write: the values of all joints.
         build: the folder to write the hand to, as MJCF with meshes, in place of moving it: on a wrist that six joints
-            move, with actuators, sites at the finger tips, ties for joints that follow others.
+            move, with actuators, sites at the finger tips, and mimic joints as equality constraints.
         objective: what follows what: vector (wrist to finger tips), dexpilot (those, and tips brought together), or
             position (links where the keypoints are, with a base that moves).
         side: which hand, where the recording holds both or does not say.
         sequence: the name of one hand or recording in the file, where there are several.
         fps: frames per second, where the recording does not say.
-        collision: what touches in the model of --build: the URDF's collision shapes, its meshes by their convex hulls,
-            or a capsule for each.
+        collision: collision geometry of the model of --build: the URDF's collision shapes, its meshes by their convex
+            hulls, or a capsule for each.
         absent_meshes: refuse a URDF whose collision meshes are not there, or build without them, with a capsule along
             the bone of each link that has no other shape.
-        self_collision: let the links of the model of --build meet each other, but for neighbours.
+        self_collision: let the links of the model of --build collide with each other, except neighbours.
     """
     if build is not None:
         if recording is not None or out is not None:

@@ -40,7 +40,7 @@ def scene(
     mano: Path | None = None,
     up: Up | None = None,
 ) -> None:
-    """Write a scene: hands, objects with their poses, gaps, rate and where up is, as .npz or JSON.
+    """Write a scene as .npz or JSON: hands, objects with their poses, gaps, frame rate and the upward direction.
 
     Args:
         recording: of any format that is read, of a data set with its objects; or of optical markers, with --markers.

@@ -20,7 +20,7 @@ FEW = 0.1  # share of the frames below which a hand is taken for a mistake of th
 def track(
     video: Annotated[Path, tyro.conf.Positional], out: Path, side: Literal["right", "left"] | None = None
 ) -> None:
-    """Follow a hand through a video and write its 21 keypoints.
+    """Track a hand in a video and write its 21 keypoints.
 
     Args:
         video: an .mp4, .mov or .avi.

@@ -55,7 +55,7 @@ def view(
             cameras.
         mano: a licensed MANO file, for recordings made with one; without it, the open hand.
         port: to serve at; 0 chooses a free one.
-        host: address to listen on; 0.0.0.0 lets other computers look too.
+        host: address to listen on; 0.0.0.0 lets other computers connect too.
     """
     seen = load_markers(markers, units, fps) if markers is not None else None
     scene = recording_scene(recording, side, sequence, fps, up, mano)
@@ -65,7 +65,7 @@ def view(
         viewer.play()
         print(f"{recording}: open {viewer.url} in a browser; Ctrl-C here ends it", flush=True)
         if viewer.public:
-            print(f"everybody who can reach this computer at {host}:{viewer.server.get_port()} can look and steer")
+            print(f"anyone who can reach this computer at {host}:{viewer.server.get_port()} can watch and control it")
         viewer.wait()
 
 

@@ -2,9 +2,8 @@
 
 import contextlib
 import functools
-import hashlib
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ import mujoco
 import numpy as np
 
 from mjx_hand.errors import InputError
+from mjx_hand.files.digests import digest
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 from mjx_hand.files.working_folder import working_file
 
@@ -39,7 +39,7 @@ def cached(compute: Callable[[], Mapping[str, np.ndarray]], *ingredients: Any) -
     cache = _cache()
     if cache is None:
         return compute()
-    path = Path(cache) / _FOLDER / f"{_digest(ingredients)}.npz"
+    path = Path(cache) / _FOLDER / f"{digest(_pieces(ingredients))}.npz"
     if path.is_file():
         try:
             arrays = dict(load_arrays(path, SCHEMA))  # all are read here, where damage is caught
@@ -73,23 +73,18 @@ def model_bytes(model: mujoco.MjModel) -> bytes:
 @functools.cache
 def _code() -> bytes:
     """A digest of the code as this process found it."""
-    content = hashlib.sha256()
-    for root in _CODE:
-        for source in sorted(root.rglob("*.py")):
-            content.update(str(source.relative_to(root)).encode())
-            content.update(source.read_bytes())
-    return content.digest()
+    sources = [(root, source) for root in _CODE for source in sorted(root.rglob("*.py"))]
+    return digest(str(source.relative_to(root)).encode() + source.read_bytes() for root, source in sources).encode()
 
 
-def _digest(ingredients: Any) -> str:
-    content = hashlib.sha256()
+def _pieces(ingredients: Any) -> Iterator[bytes]:
+    """All that what is kept depends on."""
     for library in _LIBRARIES:
-        content.update(f"{library} {version(library)} ".encode())
-    content.update(_code())
+        yield f"{library} {version(library)} ".encode()
+    yield _code()
     leaves, structure = jax.tree.flatten(ingredients)
-    content.update(f"{jax.default_backend()} {structure}".encode())
+    yield f"{jax.default_backend()} {structure}".encode()
     for leaf in leaves:
         value = np.frombuffer(leaf, np.uint8) if isinstance(leaf, bytes) else np.asarray(leaf)
-        content.update(f"{value.dtype} {value.shape}".encode())
-        content.update(value.tobytes())
-    return content.hexdigest()
+        yield f"{value.dtype} {value.shape}".encode()
+        yield value.tobytes()

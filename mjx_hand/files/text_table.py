@@ -41,7 +41,7 @@ def numbers_of(
     trimmed: bool = False,
     wider: bool = False,
 ) -> Float[np.ndarray, "t n"]:
-    """One row a line, empty cells and the word nan as NaN.
+    """One row per line, empty cells and the word nan as NaN.
 
     Args:
         path: for messages.

@@ -31,7 +31,7 @@ class Demonstration:
 
     Attributes:
         motion: the twin's hinge angles and wrist poses, at the control rate.
-        object_pose: position and quaternion of the object's frame, a row a frame.
+        object_pose: position and quaternion of the object's frame, one row per frame.
         object: what is manipulated.
         support: half extents of the boxes that hold the object up at first, if it does not stand on the table.
         support_position: centres of those boxes.

@@ -1,4 +1,4 @@
-"""Filling gaps: what a motion holds in frames that were not recorded, from the frames around them."""
+"""Gaps: where they are, and what a motion holds in frames that were not recorded, from the frames around them."""
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -21,6 +21,21 @@ def fill_turns(quaternions: Float[Array, "t 4"], valid: Bool[Array, "t"]) -> Flo
     before, after, fraction = _neighbours(valid)
     known = quaternion_matrices(quaternions[valid])
     return matrix_quaternions(slerp(known[before], known[after], fraction))
+
+
+def spans(flags: Bool[Array, "t"]) -> list[tuple[int, int]]:
+    """First frame and the one behind the last of every run that is True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+
+def short_gaps(visible: Bool[Array, "t m"], longest: int) -> Bool[Array, "t m"]:
+    """Frames of gaps of up to `longest` frames that lie between two sights of the same point."""
+    frame = np.arange(len(visible))[:, None]
+    last = np.maximum.accumulate(np.where(visible, frame, -1), axis=0)
+    following = np.minimum.accumulate(np.where(visible, frame, len(visible))[::-1], axis=0)[::-1]
+    inside = (last >= 0) & (following < len(visible))
+    return ~visible & inside & (following - last - 1 <= longest)
 
 
 def _neighbours(valid: Bool[Array, "t"]) -> tuple[Int[Array, "t"], Int[Array, "t"], Float[Array, "t"]]:

@@ -88,7 +88,7 @@ def make_scene(
 
     Args:
         hands: one of each side at most; another rate than the first one's is resampled. All begin together.
-        objects: one pose a frame, in the frame of the wrists.
+        objects: one pose per frame, in the frame of the wrists.
         fps: of the objects' poses, where it is not the first hand's: they are resampled to that, and what follows the
             shortest recording's end is left out. Without hands, the scene's rate.
         up: against gravity: an axis such as "+z", or a direction; None where it is not known.

@@ -23,8 +23,7 @@ def low_pass(motion: JointMotion, cutoff: float = CUTOFF) -> JointMotion:
     Raises:
         InputError: the cut-off is not between 0 and half the frame rate.
     """
-    if not 0 < cutoff < motion.fps / 2:
-        raise InputError(f"cut-off is {cutoff} Hz; for {motion.fps:g} frames/s it must lie between 0 and half of that")
+    check_cutoff(cutoff, motion.fps)
     quaternion = smooth_rows(motion.wrist_quaternion, motion.fps, cutoff)
     return replace(
         motion,
@@ -32,6 +31,16 @@ def low_pass(motion: JointMotion, cutoff: float = CUTOFF) -> JointMotion:
         wrist_position=smooth_rows(motion.wrist_position, motion.fps, cutoff),
         wrist_quaternion=quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True),
     )
+
+
+def check_cutoff(cutoff: float, fps: float) -> None:
+    """Refuse what no low-pass filter of this frame rate can have.
+
+    Raises:
+        InputError: the cut-off (Hz) is not between 0 and half the frame rate.
+    """
+    if not 0 < cutoff < fps / 2:
+        raise InputError(f"cut-off is {cutoff} Hz; for {fps:g} frames/s it must lie between 0 and half of that")
 
 
 def smooth_rows(rows: Float[np.ndarray, "t n"], fps: float, cutoff: float) -> Float[np.ndarray, "t n"]:

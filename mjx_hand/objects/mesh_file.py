@@ -1,6 +1,5 @@
 """Meshes of objects from files: `.stl`, `.obj`, `.ply`, `.glb`, `.off` and what else trimesh reads."""
 
-import hashlib
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +7,7 @@ import trimesh
 from jaxtyping import Float, Int
 
 from mjx_hand.errors import InputError
+from mjx_hand.files.digests import file_digest
 from mjx_hand.objects.convex_decomposition import convex_pieces
 from mjx_hand.objects.description import ObjectDescription
 
@@ -43,7 +43,7 @@ def mesh_digest(path: str | Path) -> str:
         InputError: it cannot be read.
     """
     try:
-        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+        return file_digest(Path(path))
     except OSError as error:
         raise InputError(
             f"{path}: {error.strerror}; give an object's mesh, .stl, .obj, .ply or .glb, in metres"

@@ -1,7 +1,6 @@
 """`ExportedPolicy`: a policy with its scaling and its filter, as one function of features in physical units."""
 
 import dataclasses
-import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,6 +11,7 @@ from jaxtyping import Float
 
 from mjx_hand.errors import InputError
 from mjx_hand.files.checked_arrays import numbers, text
+from mjx_hand.files.digests import digest
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 
 SCHEMA = "mjx-hand/exported-policy/1"
@@ -90,11 +90,11 @@ class ExportedPolicy:
     @property
     def digest(self) -> str:
         """SHA-256 of everything that the function computes with."""
-        content = hashlib.sha256()
-        for name, value in _arrays(self).items():
-            content.update(f"{name} {value.dtype.str} {value.shape}".encode())
-            content.update(value.tobytes())
-        return content.hexdigest()
+        return digest(
+            piece
+            for name, value in _arrays(self).items()
+            for piece in (f"{name} {value.dtype.str} {value.shape}".encode(), value.tobytes())
+        )
 
 
 def save_exported_policy(policy: ExportedPolicy, path: str | Path) -> None:

@@ -64,7 +64,7 @@ def retarget_dataset(
 
     A run that was killed is taken up where it stopped: what is done with the same input and settings is not done again.
     A file that cannot be used is reported in its row, its output from an earlier run removed, and the rest done.
-    `out/summary.csv` has one row a file.
+    `out/summary.csv` has one row per file.
 
     Args:
         folder: recordings, in folders of any depth; names that begin with a dot are passed over.

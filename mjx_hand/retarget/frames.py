@@ -79,7 +79,7 @@ def _sharding() -> NamedSharding:
 
 
 def in_chunks(call: Callable[..., Array | tuple[Array, ...]], *frames: np.ndarray) -> tuple[np.ndarray, ...]:
-    """`call` on arrays with a row a frame, chunk by chunk; the last one is padded with its last row.
+    """`call` on arrays with one row per frame, chunk by chunk; the last one is padded with its last row.
 
     The next chunk is handed over while one is computed; no more than two are on the devices.
     """

@@ -23,7 +23,7 @@ FUNCTIONAL = "functional"  # axes fitted to the recording's own rotations, from 
 class KinematicHands:
     """`rigid_hand_of` for many recordings, where joints, tips, hinges and limits are all that matters.
 
-    Masses, meshes and collision shapes, which take some tenths of a second a person to make, stay the mean hand's;
+    Masses, meshes and collision shapes, which take some tenths of a second per person, stay the mean hand's;
     a person's hand takes milliseconds, and is kept.
 
     Args:

@@ -6,7 +6,6 @@ its file is done again.
 """
 
 import dataclasses
-import hashlib
 import json
 import os
 from collections.abc import Mapping
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from mjx_hand.errors import InputError
+from mjx_hand.files.digests import json_digest
 from mjx_hand.files.npz_archive import replacing
 from mjx_hand.retarget.summary import Outcome
 
@@ -24,8 +24,7 @@ def key_of(source: Path, settings: Mapping[str, Any]) -> str:
     """A digest of the settings and of the input's size and time of change (of all its files, if it is a folder)."""
     files = sorted(p for p in source.rglob("*") if p.is_file()) if source.is_dir() else [source]
     stamps = [(str(p.relative_to(source)), p.stat().st_size, p.stat().st_mtime_ns) for p in files]
-    told = json.dumps({"settings": dict(settings), "input": stamps}, sort_keys=True, default=str)
-    return hashlib.sha256(told.encode()).hexdigest()
+    return json_digest({"settings": dict(settings), "input": stamps}, default=str)
 
 
 class Ledger:

@@ -3,6 +3,7 @@
 The filter minimises Σ over valid frames |x - y|² + λ Σ |second difference of x|² (Whittaker 1923; Eilers 2003). Its
 amplitude response is 1 / (1 + λ (2 sin(ω/2))⁴), for λ = (2 sin(ω_c/2))⁻⁴ that of a second-order Butterworth filter run
 forward and back, one half at the cut-off: what motion laboratories use, but without a value needed in every frame.
+(That one itself, in NumPy and for a recording without gaps, is `motion.smooth`.)
 
 Computed as the mean of a random walk of velocities that is seen with noise where a frame is valid: Kalman's filter and
 the smoother of Rauch, Tung and Striebel (1965), which give the same numbers in two passes over time, in float32 too.
@@ -15,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from mjx_hand.errors import InputError
+from mjx_hand.motion.smooth import check_cutoff
 
 _UNKNOWN = 1e3  # variance of what is not known before the first frame, against 1 of a frame
 
@@ -32,7 +33,7 @@ def unwrap(
     are the only jumps that equal rotations leave. Frames that are not valid keep what they hold. Can be vmapped.
 
     Args:
-        angles: a row a frame.
+        angles: one row per frame.
         valid: which frames were recorded.
         middle: of each hinge's range: of the courses that differ by whole turns, the one whose mean is nearest.
     """
@@ -55,8 +56,7 @@ def penalty(fps: float, cutoff: float) -> float:
     Raises:
         InputError: the cut-off is not between 0 and half the frame rate.
     """
-    if not 0 < cutoff < fps / 2:
-        raise InputError(f"cut-off is {cutoff} Hz; for {fps:g} frames/s it must lie between 0 and half of that")
+    check_cutoff(cutoff, fps)
     return (2 * math.sin(math.pi * cutoff / fps)) ** -4
 
 
@@ -69,7 +69,7 @@ def smooth(
     """Each column low-pass filtered along time; see the module. Can be vmapped.
 
     Args:
-        values: a row a frame; what stands in frames that are not valid has no effect, NaN included.
+        values: one row per frame; what stands in frames that are not valid has no effect, NaN included.
         valid: which frames were recorded. With fewer than two, values come back as they are there.
         penalty: λ, from `penalty(fps, cutoff)`.
 

@@ -1,4 +1,4 @@
-"""What became of each recording of a data set: one row a file."""
+"""What became of each recording of a data set: one row per file."""
 
 import csv
 import dataclasses

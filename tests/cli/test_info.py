@@ -134,7 +134,7 @@ def test_marker_files_say_how_to_fit_them(tmp_path, capsys):
     text = info(capsys, path, "--units", "mm")
     assert "hand22, of whose markers it has 100 % after 'L_'; labels begin with L_, R_" in text
     assert f"next: mjx-hand fit {path} --markers hand22 --prefix L_ --units mm --out two.motion.npz" in text
-    assert "a room of this size there is not" in info(capsys, path, "--units", "m")
+    assert "no capture volume is this large" in info(capsys, path, "--units", "m")
 
 
 def test_a_recording_that_takes_a_choice_is_no_success(tmp_path, capsys):

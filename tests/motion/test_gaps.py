@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from scipy.spatial.transform import Rotation, Slerp
 
-from mjx_hand.motion.gaps import fill_lines, fill_turns
+from mjx_hand.motion.gaps import fill_lines, fill_turns, short_gaps, spans
 from tests.motion.motions import motions
 
 
@@ -33,3 +33,14 @@ def test_turns_match_scipys_slerp_and_do_not_jump_in_sign(motion):
     angle = (Rotation.from_quat(filled, scalar_first=True).inv() * expected).magnitude()
     assert angle.max() < 1e-6
     assert (np.sum(filled[1:] * filled[:-1], axis=1) >= -1e-9).all()
+
+
+def test_lengths_of_gaps_are_counted_exactly():
+    visible = np.array([[0, 1, 0, 1, 0, 0, 1, 0, 0, 0, 1, 0]], bool).T
+    for longest, expected in ((0, []), (1, [2]), (2, [2, 4, 5]), (3, [2, 4, 5, 7, 8, 9])):
+        np.testing.assert_array_equal(np.flatnonzero(short_gaps(visible, longest)), expected)
+
+
+def test_spans_are_the_runs_with_their_ends():
+    assert spans(np.array([1, 1, 0, 1, 0, 0, 1], bool)) == [(0, 2), (3, 4), (6, 7)]
+    assert spans(np.zeros(3, bool)) == []

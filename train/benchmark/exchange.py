@@ -53,7 +53,7 @@ def scene_xml(env: TrackingEnv) -> str:
 
 
 def numbers(models: Sequence[mujoco.MjModel]) -> dict[str, np.ndarray]:
-    """All that a step may read: numbers of the models, and their options as `opt.NAME`, a row a model.
+    """All that a step may read: numbers of the models, and their options as `opt.NAME`, one row per model.
 
     Bounding volumes are those that hold all models', because mjbatch has no others for each world.
     """

@@ -136,7 +136,7 @@ def _human_links() -> list[str]:
 
 
 def table(task: Task, options: Options) -> list[str]:
-    """One row a contestant: speed and both forms of the objective."""
+    """One row per contestant: speed and both forms of the objective."""
     frames = len(task.keypoints)
     many = np.tile(task.keypoints[None], (options.copies, 1, 1, 1))
     dexi = dexi_solver(task)

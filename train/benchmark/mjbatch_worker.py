@@ -26,7 +26,7 @@ def load_model(scene, numbers):
 
     Args:
         scene: path of the MJCF.
-        numbers: fields of `MjModel`, and of its options as `opt.NAME`; a row a model.
+        numbers: fields of `MjModel`, and of its options as `opt.NAME`; one row per model.
 
     Returns:
         The model; names of fields that differ between models, of fields that it had compiled otherwise, and of fields
@@ -87,7 +87,7 @@ class Worlds:
         return time.perf_counter() - wall, time.process_time() - cpu
 
     def end(self):
-        """The generalised positions that a pass leads to, a row a world."""
+        """The generalised positions that a pass leads to, one row per world."""
         self.run(1)
         return self.batch.bind("qpos").tolist()
 

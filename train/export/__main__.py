@@ -2,7 +2,7 @@
 
 Beside the policy, with its scaling and its filter, stand a contract (`contract.json`, `contract.md`: every input and
 output, body, rate, versions, digest) and some held-out demonstrations with their scenes (`export.demonstrations=3`), in
-`export.folder=FOLDER`, usually `out`/export. What has not been trained here is the policy that comes with the project.
+`export.folder=FOLDER`, usually `out`/export. What has not been trained here is exported from the bundled policy.
 """
 
 import sys

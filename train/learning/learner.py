@@ -219,7 +219,7 @@ def _update(
     info = state.worlds.info
     worlds = state.worlds.replace(info={**info, "progress": jnp.full_like(info["progress"], progress)})  # type: ignore[attr-defined]
     worlds, data = acting.generate_unroll(env, worlds, policy, acting_key, ppo.unroll_length, extra_fields=_EXTRAS)
-    data = jax.tree.map(lambda leaf: jnp.swapaxes(leaf, 0, 1), data)  # a row a world, so that minibatches are of rows
+    data = jax.tree.map(lambda leaf: jnp.swapaxes(leaf, 0, 1), data)  # one row per world: minibatches are of rows
 
     gradient = jax.grad(
         functools.partial(

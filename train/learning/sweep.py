@@ -128,7 +128,7 @@ def combinations(overrides: Sequence[str]) -> list[Config]:
 
 
 def table(outcomes: Sequence[Outcome]) -> Table:
-    """A row a job: its name and seed, and what its task returned or why it did not."""
+    """One row per job: its name and seed, and what its task returned or why it did not."""
     columns = list(dict.fromkeys(name for outcome in outcomes for name in outcome.result))
     wrong = any(outcome.wrong for outcome in outcomes)
     made = Table("name", "seed", "folder", *columns, *(["what went wrong"] if wrong else []))

@@ -4,7 +4,6 @@
 are kept, each with a digest of its contents: a damaged one is named and the one before it used.
 """
 
-import hashlib
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -15,6 +14,7 @@ import numpy as np
 
 from mjx_hand.errors import InputError, reason_of
 from mjx_hand.files.checked_arrays import text
+from mjx_hand.files.digests import digest
 from mjx_hand.files.npz_archive import load_arrays, save_arrays
 
 SCHEMA = "mjx-hand/run/2"
@@ -112,9 +112,6 @@ def _filled(path: Path, template: Any, arrays: Mapping[str, np.ndarray]) -> Any:
 
 
 def _digest(arrays: Mapping[str, np.ndarray]) -> str:
-    content = hashlib.sha256()
-    for name in sorted(arrays):
-        value = np.asarray(arrays[name])
-        content.update(f"{name} {value.dtype} {value.shape}".encode())
-        content.update(value.tobytes())
-    return content.hexdigest()
+    # Types by their names, where exported policies have NumPy's codes: both stand in files of users.
+    values = [(name, np.asarray(arrays[name])) for name in sorted(arrays)]
+    return digest(piece for name, v in values for piece in (f"{name} {v.dtype} {v.shape}".encode(), v.tobytes()))

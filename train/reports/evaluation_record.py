@@ -2,7 +2,6 @@
 
 import csv
 import dataclasses
-import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
@@ -16,6 +15,7 @@ from envs.demonstrations.set_settings import fingerprint, sealed_folder, set_fol
 from envs.evaluation.evaluate import Evaluation
 from envs.evaluation.people import people_of, person_scores
 from envs.grasps import grasp_names, grasp_type
+from mjx_hand.files.digests import digest
 from mjx_hand.files.npz_archive import replacing
 from train.experiment.evaluate_seeds import POLICY, Results, shared_folder
 from train.reports.interval import intervals
@@ -112,7 +112,7 @@ def made_of(path: Path, configs: Sequence[Config]) -> dict[str, Any] | None:
 
 def evaluation_fingerprint(configs: Sequence[Config]) -> str:
     """A digest of all that an evaluation depends on: settings, demonstrations, policies, and the versions."""
-    content = hashlib.sha256(f"{SCHEMA} {version('mjx-hand')}".encode())
+    pieces = [f"{SCHEMA} {version('mjx-hand')}".encode()]
     for config in configs:
         parts = [fingerprint(config.data)]
         parts += [dataclasses.asdict(part) for part in (config.task, config.ppo, config.checks)]
@@ -122,11 +122,11 @@ def evaluation_fingerprint(configs: Sequence[Config]) -> str:
             sets += [part_digest(config.data.folder, part) for part in PARTS]
         forces = [grasp_type(name).grip_force for name in grasp_names()]
         told = [config.name, config.part, config.engine, config.seed, sets, forces, parts]
-        content.update(json.dumps(told, sort_keys=True).encode())
+        pieces.append(json.dumps(told, sort_keys=True).encode())
         policy = Path(config.checkpoint) if config.checkpoint else Path(config.out) / "best.npz"
         for path in (policy, Path(config.out) / "curve.csv"):
-            content.update(path.read_bytes() if path.is_file() else b"none")
-    return content.hexdigest()
+            pieces.append(path.read_bytes() if path.is_file() else b"none")
+    return digest(pieces)
 
 
 def mean_scores(rows: Sequence[Mapping[str, float]]) -> dict[str, float]:

@@ -12,8 +12,9 @@ from jaxtyping import Bool, Float
 from scipy.optimize import least_squares
 
 from envs.demonstrations.observation.solids import Solid
-from envs.demonstrations.observation.stillness import ObjectPath, spans
+from envs.demonstrations.observation.stillness import ObjectPath
 from mjx_hand.errors import InputError
+from mjx_hand.motion.gaps import spans
 
 _TILT, _LEVEL = 0.09, 0.005  # rad and m by which single poses are off
 _TOGETHER = 10  # frames that are off together

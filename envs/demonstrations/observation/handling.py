@@ -8,9 +8,9 @@ from jaxtyping import Bool, Float, Int
 from scipy.ndimage import minimum_filter1d
 from scipy.spatial import KDTree
 
-from envs.demonstrations.observation.stillness import ObjectPath, spans
+from envs.demonstrations.observation.stillness import ObjectPath
 from mjx_hand.capture.keypoints.skeleton import BONES
-from mjx_hand.motion.gaps import fill_lines
+from mjx_hand.motion.gaps import fill_lines, spans
 from mjx_hand.motion.motion import Motion
 from mjx_hand.rigid.rigid_hand import RigidHand
 from mjx_hand.robots.motion_keypoints import motion_keypoints
@@ -31,7 +31,7 @@ MOVED = 0.02  # m: less is no manipulation
 
 
 @dataclasses.dataclass(frozen=True)
-class Act:
+class Manipulation:
     """Frames of a recording that one hand can repeat: an object rests, is moved by the hand, may rest again.
 
     Attributes:
@@ -102,9 +102,9 @@ def labelled(
     return labels
 
 
-def longest_act(
+def longest_manipulation(
     labels: Int[np.ndarray, "t"], position: Float[np.ndarray, "t 3"], distance: Float[np.ndarray, "t"], fps: float
-) -> Act | str:
+) -> Manipulation | str:
     """The longest manipulation among the frames, or why there is none.
 
     It begins with the object at rest and the hand off it, as much before it is moved as is there, up to two seconds.
@@ -132,7 +132,7 @@ def longest_act(
             left[reason] = found
     if found := [(a, b - 1) for a, b in spans(outside == CARRIED)]:
         left["another act of the same recording"] = found
-    return Act(begin, end, labels[begin:end], left)
+    return Manipulation(begin, end, labels[begin:end], left)
 
 
 def _on_object(points: Float[np.ndarray, "t k 3"], path: ObjectPath) -> Float[np.ndarray, "t k 3"]:

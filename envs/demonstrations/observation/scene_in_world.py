@@ -10,11 +10,11 @@ from scipy.spatial.transform import Rotation
 from envs.demonstrations.observation.gravity import estimate_up
 from envs.demonstrations.observation.handling import (
     AT_HAND,
-    Act,
+    Manipulation,
     distances,
     hand_points,
     labelled,
-    longest_act,
+    longest_manipulation,
 )
 from envs.demonstrations.observation.rigid_objects import rigid_objects
 from envs.demonstrations.observation.solids import Solid, samples, solid_of
@@ -49,7 +49,7 @@ class Handled:
     solid: Solid
     path: ObjectPath
     distance: Float[np.ndarray, "t"]
-    act: Act
+    act: Manipulation
     world: Float[np.ndarray, "3 3"]
     up: str
     frames: int
@@ -101,8 +101,8 @@ def handled_object(
         told = [(away[each, k], seen[each][0].valid, seen[each][1]) for each in sorted(seen, key=lambda e: e != s)]
         told = [(d, v, p @ world.T) for d, v, p in told]
         labels = labelled(path, height, told, scene.fps)
-        act = longest_act(labels, path.position, away[s, k], scene.fps)
-        if isinstance(act, Act):
+        act = longest_manipulation(labels, path.position, away[s, k], scene.fps)
+        if isinstance(act, Manipulation):
             return Handled(seen[s][0], objects[k].name, solids[k], path, away[s, k], act, world, how, scene.num_frames)
         nearest = 100 * float(away[s, k].min())
         why = why or f"object {objects[k].name!r}, {s} hand: {act} (nearest {nearest:.1f} cm)"

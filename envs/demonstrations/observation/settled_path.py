@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.observation.handling import CARRIED, RESTS
 from envs.demonstrations.observation.solids import Solid
-from envs.demonstrations.observation.stillness import ObjectPath, mean_rotations, spans
-from mjx_hand.motion.gaps import fill_turns
+from envs.demonstrations.observation.stillness import ObjectPath, mean_rotations
+from mjx_hand.motion.gaps import fill_turns, spans
 from mjx_hand.motion.resample import matrix_quaternions, quaternion_matrices
 
 _UP = np.array([0.0, 0.0, 1.0])

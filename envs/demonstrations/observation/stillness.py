@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import median_filter
 from scipy.spatial.transform import Rotation
 
-from mjx_hand.motion.gaps import fill_lines, fill_turns
+from mjx_hand.motion.gaps import fill_lines, fill_turns, spans
 from mjx_hand.motion.resample import quaternion_matrices
 from mjx_hand.motion.scene import RecordedObject
 
@@ -64,12 +64,6 @@ def object_path(recorded: RecordedObject, fps: float) -> ObjectPath:
     share = (after - before) / (2 * half)  # at the ends they are nearer together
     still = (moved < share * np.clip(_OF_NOISE * place, *_PLACE)) & (turned < share * np.clip(_OF_NOISE * turn, *_TURN))
     return ObjectPath(position, rotation, recorded.seen, float(place), float(turn), _lasting(still, fps))
-
-
-def spans(flags: Bool[np.ndarray, "t"]) -> list[tuple[int, int]]:
-    """First frame and the one behind the last of every run that is True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def mean_rotations(rotation: Float[np.ndarray, "t 3 3"], width: int) -> Float[np.ndarray, "t 3 3"]:

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
+# `envs.live.twin.hand_solver` is another such loop: see there why the two are not one.
 Equations = Callable[[Float[np.ndarray, "u"]], tuple[Float[np.ndarray, "r"], Float[np.ndarray, "r u"]]]
 
 

@@ -13,12 +13,12 @@ from envs.demonstrations.from_recording.grasp_trajectory import Act, grasp_traje
 from envs.demonstrations.from_recording.observed import ObservedSequence
 from envs.demonstrations.from_recording.touching import gaps_over_time
 from envs.demonstrations.observation.settled_path import held_rotation, shortest_turn
-from envs.demonstrations.observation.stillness import spans
 from envs.demonstrations.recordings.recorded_demonstration import Figures, Recorded
 from envs.demonstrations.recordings.recording_settings import RecordingSettings
 from envs.grip_force import grip_force_of
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import Demonstration
+from mjx_hand.motion.gaps import spans
 from mjx_hand.motion.joint_motion import JointMotion
 from mjx_hand.motion.resample import matrix_quaternions
 from mjx_hand.objects.primitives import hull_planes

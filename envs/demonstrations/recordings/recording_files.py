@@ -1,11 +1,11 @@
 """Which recordings a path stands for: one, or all below a folder; and a digest of what they hold."""
 
-import hashlib
 from pathlib import Path
 
 from mjx_hand.capture.load_scene import scene_format
 from mjx_hand.errors import InputError
 from mjx_hand.files.contents import read_contents
+from mjx_hand.files.digests import digest, file_piece
 
 _BESIDE = (".stl", ".obj", ".ply", ".glb", ".off")  # meshes that a recording's file does not hold itself
 
@@ -37,12 +37,10 @@ def recording_digest(path: str | Path) -> str:
     Raises:
         InputError: as `recordings_of`.
     """
-    content = hashlib.sha256()
+    pieces: list[bytes] = []
     for recording in recordings_of(path):
-        content.update(recording.name.encode())
-        for file in _files(recording):
-            content.update(file.name.encode() + hashlib.sha256(file.read_bytes()).digest())
-    return content.hexdigest()
+        pieces += [recording.name.encode(), *map(file_piece, _files(recording))]
+    return digest(pieces)
 
 
 def _below(path: Path) -> list[Path]:

@@ -47,7 +47,7 @@ def perform(
     object_start: Float[np.ndarray, "n 7"],
     lifted_at: Float[np.ndarray, "n"],
 ) -> Performance:
-    """Run each model under its controls, one row a physics step, from its first control's pose.
+    """Run each model under its controls, one row per physics step, from its first control's pose.
 
     Args:
         models: scenes (`envs.scene.scene_spec`) on the engine's settings.

@@ -94,7 +94,7 @@ def _object(message: bytes | str) -> dict[str, Any]:
     try:
         told = json.loads(message)
     except (ValueError, RecursionError):
-        raise InputError("message: no JSON; send one object a frame, such as {'keypoints': [[x, y, z], …]}") from None
+        raise InputError("message: no JSON; send one object per frame, such as {'keypoints': [[x, y, z], …]}") from None
     if not isinstance(told, dict):
         raise InputError("message: JSON, but no object; send {'keypoints': [[x, y, z], …]}")
     return told

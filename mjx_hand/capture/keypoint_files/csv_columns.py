@@ -1,4 +1,4 @@
-"""Keypoints as a table: a header of `NAME_x,NAME_y,NAME_z` columns (or `x0,y0,z0,x1,…`), one line a frame.
+"""Keypoints as a table: a header of `NAME_x,NAME_y,NAME_z` columns (or `x0,y0,z0,x1,…`), one line per frame.
 
 Columns `time`, `t` or `timestamp` (`time_ms` says a unit) and `frame` say when lines were taken. Lines before the
 header may say `# fps: 30`, `# unit: mm`, `# side: left` or `# layout: leap_bones`. Names that begin with `left_` or

@@ -1,34 +1,22 @@
 """Gaps and noise of keypoints, before anything is fitted to them."""
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
-from mjx_hand.errors import InputError
-from mjx_hand.motion.gaps import fill_lines
-from mjx_hand.motion.smooth import smooth_rows
+from mjx_hand.motion.gaps import fill_lines, short_gaps, spans
+from mjx_hand.motion.smooth import check_cutoff, smooth_rows
 
 Array = np.ndarray
 
 
-def runs(flags: Bool[Array, "t"]) -> list[slice]:
-    """The stretches of frames in which `flags` is true."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-
-
 def fill_short_gaps(positions: Float[Array, "t 21 3"], frames: int) -> Float[Array, "t 21 3"]:
     """Straight lines across a keypoint's gaps of at most `frames` frames; longer ones and the ends stay NaN."""
-    filled = positions.copy()
-    for k in range(positions.shape[1]):
-        seen = np.asarray(np.isfinite(positions[:, k]).all(axis=1))
-        if not seen.any():
-            continue
-        lines = fill_lines(np.where(seen[:, None], positions[:, k], 0.0), seen)
-        filled[~seen, k] = np.nan
-        for gap in runs(~seen):
-            inside = gap.start > 0 and gap.stop < len(seen)
-            if inside and gap.stop - gap.start <= frames:
-                filled[gap, k] = lines[gap]
+    filled, seen = positions.copy(), np.isfinite(positions).all(axis=2)
+    short = short_gaps(seen, frames)
+    for k in np.flatnonzero(seen.any(axis=0)):
+        lines = fill_lines(np.where(seen[:, k, None], positions[:, k], 0.0), seen[:, k])
+        filled[~seen[:, k], k] = np.nan
+        filled[short[:, k], k] = lines[short[:, k]]
     return filled
 
 
@@ -38,10 +26,9 @@ def low_pass_keypoints(positions: Float[Array, "t 21 3"], fps: float, cutoff: fl
     Raises:
         InputError: the cut-off (Hz) is not between 0 and half the frame rate.
     """
-    if not 0 < cutoff < fps / 2:
-        raise InputError(f"cut-off is {cutoff} Hz; for {fps:g} frames/s it must lie between 0 and half of that")
+    check_cutoff(cutoff, fps)
     out = positions.copy()
     for k in range(positions.shape[1]):
-        for run in runs(np.asarray(np.isfinite(positions[:, k]).all(axis=1))):
-            out[run, k] = smooth_rows(positions[run, k], fps, cutoff)
+        for begin, end in spans(np.asarray(np.isfinite(positions[:, k]).all(axis=1))):
+            out[begin:end, k] = smooth_rows(positions[begin:end, k], fps, cutoff)
     return out

@@ -31,7 +31,7 @@ def _read(path: Path, units: str | None, fps: float | None) -> MarkerRecording:
     said = _comments(lines)
     body = [(k, line) for k, line in enumerate(lines, start=1) if line.strip() and not line.startswith("#")]
     if not body:
-        raise InputError(f"{path}: no table in it; give a line of column names and one line a frame")
+        raise InputError(f"{path}: no table in it; give a line of column names and one line per frame")
     columns, rows = [cell.strip() for cell in body[0][1].split(",")], body[1:]
     names, where = _markers(path, columns)
     time, number = (

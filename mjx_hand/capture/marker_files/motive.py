@@ -1,4 +1,4 @@
-"""OptiTrack Motive's CSV export: a line of keys and values, lines that say what each column is, then a row a frame.
+"""OptiTrack Motive's CSV export: a line of keys and values, lines that say what each column is, then one row per frame.
 
 The columns of type `Marker` are read (https://docs.optitrack.com/motive/data-export/data-export-csv): measured places,
 where `Rigid Body Marker` and `Bone Marker` are a solver's. `Length Units` and `Export Frame Rate` stand in the first

@@ -12,7 +12,7 @@ from mjx_hand.capture.marker_fit.skinned_points import SkinnedPoints
 from mjx_hand.pytree import replace
 
 CHUNK = 256  # frames per call
-BY_FRAME = ("observed", "weight", "rest", "centres", "mean")  # what of `Frames` has a row a frame
+BY_FRAME = ("observed", "weight", "rest", "centres", "mean")  # what of `Frames` has one row per frame
 Array = np.ndarray
 
 

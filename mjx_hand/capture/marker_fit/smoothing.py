@@ -1,4 +1,9 @@
-"""Fingers have mass: the smooth course of a joint that each frame's own estimate supports as far as it is certain."""
+"""Fingers have mass: the smooth course of a joint that each frame's own estimate supports as far as it is certain.
+
+The same penalty as `retarget.smoothing`, which weights all recorded frames alike and is compiled to run over many
+recordings at once. Here each joint of each frame has its own weight, and double precision is at hand: a banded
+factorisation is the whole solver.
+"""
 
 import numpy as np
 from jaxtyping import Float, Int

@@ -1,11 +1,15 @@
-"""Short gaps in a marker's course, filled before the fit."""
+"""Short gaps in a marker's course, filled before the fit.
+
+By a cubic, where keypoints' gaps (`keypoint_fit.smooth`) take straight lines: markers are measured to a
+fraction of a millimetre, so that their speed at a gap's ends is known; that of keypoints is mostly noise.
+"""
 
 import numpy as np
-from jaxtyping import Bool
 from scipy.interpolate import PchipInterpolator
 
 from mjx_hand.capture.markers.marker_recording import MarkerRecording
 from mjx_hand.errors import InputError
+from mjx_hand.motion.gaps import short_gaps
 from mjx_hand.pytree import replace
 
 FILL = 0.1  # s: gaps that are filled unless something else is said
@@ -28,12 +32,3 @@ def fill_short_gaps(recording: MarkerRecording, seconds: float) -> MarkerRecordi
         seen, gaps = (np.flatnonzero(mask[:, marker]) for mask in (recording.visible, short))
         positions[gaps, marker] = PchipInterpolator(seen, positions[seen, marker])(gaps)
     return replace(recording, positions=positions, visible=recording.visible | short)
-
-
-def short_gaps(visible: Bool[np.ndarray, "t m"], longest: int) -> Bool[np.ndarray, "t m"]:
-    """Frames of gaps of up to `longest` frames that lie between two sights of the marker."""
-    frame = np.arange(len(visible))[:, None]
-    last = np.maximum.accumulate(np.where(visible, frame, -1), axis=0)
-    following = np.minimum.accumulate(np.where(visible, frame, len(visible))[::-1], axis=0)[::-1]
-    inside = (last >= 0) & (following < len(visible))
-    return ~visible & inside & (following - last - 1 <= longest)

@@ -49,7 +49,7 @@ def row_order(path: object, stamps: Float[Array, "t"], near: float, what: str) -
             first = int(np.argmax(np.diff(stamps) < 0)) + 1
             raise InputError(
                 f"{path}: frame {first}'s {what} is before the one before it, and {len(astray)} are out of order; "
-                f"sort the frames by {what}, and give one recording a file"
+                f"sort the frames by {what}, and give one recording per file"
             )
         notes.append(f"{_frames(len(astray))} left out whose {what} is before an earlier one's, first {astray[0]}")
     first = np.concatenate([[True], np.diff(stamps[rows]) > near])

@@ -85,7 +85,7 @@ def markers(path: Path, units: str | None = None, fps: float | None = None) -> t
     holes = ", ".join(f"{found.names[m]} {100 * missing[m]:.1f} %" for m in worst if missing[m] > 0)
     at = found.positions[found.visible]
     extent = np.ptp(at, axis=0) if len(at) else np.zeros(3)
-    doubt = "; a room of this size there is not, give --units" if extent.max() > BIGGEST_ROOM else ""
+    doubt = "; no capture volume is this large, give --units" if extent.max() > BIGGEST_ROOM else ""
     return (
         ("markers", f"{len(found.names)}: {', '.join(found.names)}"),
         frames(found.num_frames, found.fps),

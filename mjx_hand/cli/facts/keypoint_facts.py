@@ -82,7 +82,7 @@ def _points(found: KeypointRecording) -> Facts:
     extent = np.nanmax(found.positions, axis=(0, 1)) - np.nanmin(found.positions, axis=(0, 1))
     across = np.ptp(found.positions[np.asarray(seen.any(axis=1))], axis=1)
     big = np.isfinite(across).any() and np.nanmedian(across.max(axis=-1)) > BIGGEST_HAND
-    doubt = "; a hand of this size there is not, give --unit to mjx-hand keypoints" if big else ""
+    doubt = "; no hand is this large, give --unit to mjx-hand keypoints" if big else ""
     return (
         ("keypoints", f"{21 - len(never)} of 21, layout {found.layout}{lacks}"),
         ("gaps", share_missing(~seen[:, seen.any(axis=0)])),

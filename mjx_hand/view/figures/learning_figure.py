@@ -1,4 +1,4 @@
-"""Learning curves of several seeds in one figure, a line a seed."""
+"""Learning curves of several seeds in one figure, one line per seed."""
 
 import itertools
 from collections.abc import Mapping

@@ -56,7 +56,7 @@ def learning_curve(
 
     Args:
         steps: control steps at each evaluation.
-        values: the score at each evaluation, or one row a seed.
+        values: the score at each evaluation, or one row per seed.
         baseline: the same score of the zero residual, drawn as a level.
         label: of the vertical axis.
         share: the score is a share of rollouts: 0 to 1, shown in percent.
@@ -138,7 +138,7 @@ def joint_errors(
 
     Args:
         joints: names, along the horizontal axis.
-        errors: method name to its errors, a column a joint.
+        errors: method name to its errors, one column per joint.
         label: of the vertical axis.
 
     Raises:

@@ -32,7 +32,7 @@ def skin_error_figure(
     soft: Sequence[Mesh],
     errors: Sequence[Float[np.ndarray, "_"]],
 ) -> Figure:
-    """A row a posture: the rigid hand and the blended skin, coloured by its distance, from three sides.
+    """One row per posture: the rigid hand and the blended skin, coloured by its distance, from three sides.
 
     Args:
         names: of the postures.

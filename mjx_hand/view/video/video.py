@@ -30,7 +30,7 @@ def render_frames(
     size: tuple[int, int] = (640, 480),
     caption: str = "",
 ) -> Generator[Frame, None, None]:
-    """Yield a picture a row of qpos.
+    """Yield one picture per row of qpos.
 
     Args:
         model: the scene, with visual meshes; it is left as it is.

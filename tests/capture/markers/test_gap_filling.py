@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mjx_hand.capture.markers.gap_filling import fill_short_gaps, short_gaps
+from mjx_hand.capture.markers.gap_filling import fill_short_gaps
 from mjx_hand.capture.markers.marker_recording import MarkerRecording, hide_marker
 from mjx_hand.errors import InputError
 
@@ -30,12 +30,6 @@ def test_short_gaps_follow_the_course_and_long_ones_stay(recording):
     np.testing.assert_array_equal(filled.positions[recording.visible], recording.positions[recording.visible])
     assert fill_short_gaps(recording, 0.2).visible[100:120, 0].all()
     np.testing.assert_array_equal(fill_short_gaps(recording, 0.0).visible, recording.visible)
-
-
-def test_lengths_of_gaps_are_counted_exactly():
-    visible = np.array([[0, 1, 0, 1, 0, 0, 1, 0, 0, 0, 1, 0]], bool).T
-    for longest, expected in ((0, []), (1, [2]), (2, [2, 4, 5]), (3, [2, 4, 5, 7, 8, 9])):
-        np.testing.assert_array_equal(np.flatnonzero(short_gaps(visible, longest)), expected)
 
 
 def test_bad_arguments(recording):

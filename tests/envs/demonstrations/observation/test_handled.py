@@ -9,8 +9,9 @@ from scipy.spatial.transform import Rotation
 from envs.demonstrations.observation.handling import CARRIED, RESTS
 from envs.demonstrations.observation.scene_in_world import handled_object
 from envs.demonstrations.observation.settled_path import settled_path, support_boxes
-from envs.demonstrations.observation.stillness import object_path, spans
+from envs.demonstrations.observation.stillness import object_path
 from mjx_hand.errors import InputError
+from mjx_hand.motion.gaps import spans
 from mjx_hand.motion.make_scene import make_scene, recorded_object
 from mjx_hand.retarget.hands import KinematicHands
 from tests.envs.demonstrations.observation.acts import AT, AWAY, BOX, FACES, FPS, HALF, motion, scene, smooth, way
