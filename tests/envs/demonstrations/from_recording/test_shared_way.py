@@ -47,20 +47,20 @@ def test_each_takes_half_of_what_they_disagree_by_and_a_rest_none(rests):
 
 def test_what_is_put_lower_does_not_go_through_the_table():
     seen = carried()
-    seen.hand_position[100:, 2] -= 0.2
+    seen.hand_position[110:, 2] -= 0.2
     found, _ = shared_way(seen, LIFTED, CORNERS, rests=False, spun=False)
     lowest = found.position[:, 2] + (found.rotation[:, 2] @ CORNERS.T).min(axis=1)
     assert lowest.min() > -1e-9
-    assert (found.position[100:, 2] < seen.position[100:, 2] - 1e-6).any()
+    assert (found.position[110:, 2] < seen.position[110:, 2] - 1e-6).any()
 
 
 def test_a_turn_that_was_not_seen_is_the_hands_and_one_that_was_seen_stays():
-    spin = np.where(np.arange(FRAMES) > LIFTED + 10, np.linspace(0, 1.5, FRAMES), 0.0)
+    spin = np.clip((np.arange(FRAMES) - LIFTED) / 60, 0, 1)
     seen = carried(spin)
     found, wrist = shared_way(seen, LIFTED, CORNERS, rests=False, spun=True)
     beside = np.einsum("tji,tj->ti", found.rotation, found.hand_position - found.position)
     off = np.linalg.norm(beside - wrist, axis=1)[LIFTED + 25 :]
     before = np.einsum("tji,tj->ti", seen.rotation, seen.hand_position - seen.position)
-    assert off.max() < 0.02 < 0.08 < np.ptp(before[LIFTED + 25 :], axis=0).max()
+    assert off.max() < 0.02 < 0.05 < np.ptp(before[LIFTED + 25 :], axis=0).max()
     kept, _ = shared_way(seen, LIFTED, CORNERS, rests=False, spun=False)
     np.testing.assert_array_equal(kept.rotation, seen.rotation)

@@ -1,7 +1,5 @@
 """Left-hand recordings, alone and among right-hand ones: the mirror image of a recording becomes that of its result."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -38,8 +36,11 @@ def mirrored(scene: RecordedScene) -> RecordedScene:
 
 
 def figures(name: str, side: str) -> Figures:
-    given = {field.name: 0.0 for field in dataclasses.fields(Figures) if field.default is dataclasses.MISSING}
-    return Figures(**{**given, "name": name, "side": side})
+    lengths = ("gap_before", "gap", "depth_before", "depth", "hand_moved", "hand_turned", "angles_moved")
+    lengths += ("object_moved", "object_turned", "way_moved")
+    frames = {"first": 0, "last": 99, "frames": 100, "pieces": 1, "bridged": 0}
+    said = {"object": "cube", "up": "told", "how_heavy": "given", "supports": [0.0], "touching": [], "left_out": {}}
+    return Figures(name=name, side=side, rate=50.0, mass=0.1, **frames, **said, **dict.fromkeys(lengths, 0.0))
 
 
 def test_those_that_are_fewer_are_mirrored():
