@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from envs.demonstrations.from_recording import grasp_search
 from envs.demonstrations.from_recording.grasp_pose import GraspPose, capsule_gaps, joined, spins, unlikeliness
-from envs.demonstrations.from_recording.grasp_rollout import GraspRollout
+from envs.demonstrations.from_recording.grasp_rollout import GraspRollout, RolloutScore
 from envs.demonstrations.from_recording.grasp_search import search_grasp
 from envs.demonstrations.from_recording.grasp_trajectory import Act, grasp_trajectory
 from envs.demonstrations.from_recording.observed import ObservedSequence
@@ -142,6 +143,39 @@ def test_a_grasp_off_the_object_is_lost_and_a_good_one_is_not(act, good):
         assert score.error[0] < 0.01
         assert score.held_share[1] < 0.95
         assert np.linalg.norm(score.settled.position[0] - good.position) < 0.01
+
+
+@pytest.mark.parametrize("carries", [True, False])
+def test_the_search_ends_when_nothing_better_comes(act, good, monkeypatch, carries):
+    """With a stand-in for the engine that judges by the place alone, and nothing to compile."""
+    flags = []
+
+    class Judge:
+        def __init__(self, act, force, count):
+            pass
+
+        def carry(self, grasps, *, fixed):
+            flags.append(fixed)
+            off = np.linalg.norm(grasps.position - good.position, axis=1)
+            share = np.clip(1.0 - 10 * np.maximum(off - 0.006, 0), 0, 1 if carries else 0.5)
+            return RolloutScore(held_share=share, error=0.0 * off, moved=off, settled=grasps)
+
+    monkeypatch.setattr(grasp_search, "GraspRollout", Judge)
+    monkeypatch.setattr(grasp_search, "pregrasp", lambda grasps, hand, planes, clearance: grasps)
+    monkeypatch.setattr(grasp_search, "unlikeliness", lambda grasps, *rest, **options: np.zeros(len(grasps.angles)))
+    if carries:
+        found = search_grasp(act, act.held[None], FORCE, tried=60)
+        assert (
+            np.linalg.norm(found.position - good.position) < 0.006 < np.linalg.norm(act.held.position - good.position)
+        )
+        assert flags[0]
+        assert not any(flags[-4:])
+        assert len(flags) < 20
+    else:
+        with pytest.raises(InputError, match="the best, 50 % of the way"):
+            search_grasp(act, act.held[None], FORCE, tried=60)
+        assert sum(flags) == 8
+        assert len(flags) < 40
 
 
 @pytest.mark.slow
