@@ -10,7 +10,7 @@ from mujoco import batch
 from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.from_recording.grasp_pose import GraspPose, chosen
-from envs.demonstrations.from_recording.grasp_trajectory import Act, grasp_trajectory
+from envs.demonstrations.from_recording.grasp_trajectory import Act, GraspTrajectory, grasp_trajectory
 from envs.grip import grip_offsets
 from envs.physics.solver import gauss_seidel
 from envs.reference import anticipated
@@ -23,7 +23,6 @@ from mjx_hand.rigid.rigid_hand import on_device
 
 _SETTLED = 10  # frames after the fingers have closed
 _LOST, _TURNED = 0.03, 0.5  # m and rad from its way: lost
-_NO_BOXES = np.zeros((0, 3))
 _OBJECT = NUM_WRIST + NUM_HINGES
 
 
@@ -34,11 +33,13 @@ class RolloutScore:
     Attributes:
         held_share: for what share of the time, from when the fingers begin to close, the object was on its way.
         error: how far the object was from its way until then, mean (m).
+        moved: how far the wrist is told to be from where it was recorded, mean (m).
         settled: how hand and object lay before the lift.
     """
 
     held_share: Float[np.ndarray, "n"]
     error: Float[np.ndarray, "n"]
+    moved: Float[np.ndarray, "n"]
     settled: GraspPose
 
 
@@ -57,7 +58,8 @@ class GraspRollout:
         self.base = observed.hand_rotation[0]
         self.fps = 1 / (observed.times[1] - observed.times[0])
         self.substeps = round(1 / (self.fps * TIMESTEP))
-        model = scene_spec(act.hand, description, _NO_BOXES, _NO_BOXES, self.base, gains=self.gains).compile()
+        boxes = act.support, act.support_position
+        model = scene_spec(act.hand, description, *boxes, self.base, gains=self.gains).compile()
         (self.model,) = gauss_seidel([model])
         self.heavy = with_heavy_object(self.model)
         self.worlds = batch.Batch(self.model, nsim=count)
@@ -76,35 +78,48 @@ class GraspRollout:
     def carry(self, grasps: GraspPose, *, fixed: bool) -> RolloutScore:
         """Take the object, lift and carry it; `fixed`: it stays where it is while the fingers close."""
         act, worlds = self.act, self.worlds
-        targets, controls, pose = self._commands(grasps)
-        settled = act.closed + _SETTLED
+        trajectory = grasp_trajectory(act, grasps)
+        targets, controls, pose = self._commands(trajectory)
+        settled, begin = (
+            act.closed + _SETTLED,
+            max(int(np.argmax(act.arriving_share > 0)) - 1, 0),
+        )  # as recorded until then
         worlds.set_models([self.heavy if fixed else self.model] * self.count)
         worlds.state[:] = 0.0
         qpos, qvel, ctrl = (worlds.bind(name) for name in ("qpos", "qvel", "ctrl"))
-        qpos[:] = np.concatenate([targets[:, 0], pose[:, 0]], axis=1)
+        qpos[:] = np.concatenate([targets[:, begin], pose[:, begin]], axis=1)
         lay, error, lost = qpos.copy(), [], []
-        for frame in range(1, len(act.observed.times)):
+        kept = np.ones(self.count, bool)  # worlds that have the object still: the others stop
+        frames = len(act.observed.times)
+        for frame in range(begin + 1, frames):
             ctrl[:] = controls[:, frame]
-            worlds.step(nstep=self.substeps)
+            if kept.any():
+                worlds.step(ids=np.flatnonzero(kept), nstep=self.substeps)
             if fixed and frame <= settled:
                 qpos[:, _OBJECT:], qvel[:, _OBJECT:] = pose[:, frame], 0.0
             if frame == settled:
                 lay = qpos.copy()
                 worlds.set_models([self.model] * self.count)
             off, turn = _off(qpos, pose[:, frame])
+            gone = (off > _LOST) | (turn > _TURNED) | ~np.isfinite(off)
+            if frame > settled:
+                kept &= ~gone
             error.append(off)
-            lost.append((off > _LOST) | (turn > _TURNED) | ~np.isfinite(off))
+            lost.append(gone)
         count = np.where(np.any(lost, axis=0), np.argmax(lost, axis=0), len(lost))
         before = np.arange(len(lost))[:, None] < count
+        until = begin + 1 + count
+        away = trajectory.wrist_position - act.observed.hand_position
         return RolloutScore(
-            held_share=np.maximum(count - act.closing, 0) / (len(lost) - act.closing),
+            held_share=np.maximum(until - act.closing, 0) / (frames - act.closing),
             error=np.where(before, error, 0.0).sum(axis=0) / np.maximum(count, 1),
+            moved=np.linalg.norm(away, axis=2).mean(axis=1),
             settled=_relative_pose(lay, self.base, grasps),
         )
 
-    def _commands(self, grasps: GraspPose) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _commands(self, trajectory: GraspTrajectory) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Targets, controls and the object's poses, (n, t, 26), (n, t, 26) and (n, t, 7)."""
-        act, trajectory = self.act, grasp_trajectory(self.act, grasps)
+        act = self.act
         turns = [
             wrist_coordinates(position, matrix_quaternions(rotation), self.base)
             for position, rotation in zip(trajectory.wrist_position, trajectory.wrist_rotation, strict=True)

@@ -19,11 +19,14 @@ from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
 
 _KEPT = 1 / 6  # of a generation
-_FIXED, _FEWEST, _MOST = 8, 16, 40  # generations: object fixed until it is grasped, and of all
+# Generations at most with the object fixed until it is grasped (until all that are kept carry it), and of all; and how
+# many without one that is better, by what it costs, end the search that has found one, and one that has not.
+_FIXED, _MOST, _SAME, _PATIENT, _BETTER = 8, 40, 3, 8, 0.01
 _ANGLE, _TURN, _PLACE = 0.15, 0.1, 0.008  # rad and m by which changes differ, times one of:
 _SCALES = (0.05, 0.1, 0.25, 0.5, 1.0)
 _FROM_SETTLED = 0.3  # of the changed start from how the hand lay on the object, the others from what it was told
-_OFF_WAY, _UNLIKELY = 10.0, 0.003  # what 1 m off the way and an unlikeliness of 1 cost; losing it at once costs 1
+# What 1 m off its way costs, the object's and the hand's alike, and an unlikeliness of 1; losing it at once costs 1.
+_OFF_WAY, _UNLIKELY = 10.0, 0.003
 
 
 def search_grasp(
@@ -48,14 +51,23 @@ def search_grasp(
     rollout, rng = GraspRollout(act, force, tried), np.random.default_rng(0)
     rows = np.arange(tried) % len(candidates.angles)
     scale = np.where(np.arange(tried) < len(candidates.angles), 0.0, 1.0)
-    now, best = _changed(candidates[rows], act, scale, rng), 0.0
+    now = _changed(candidates[rows], act, scale, rng)
+    fixed, best, least, since = True, 0.0, np.inf, 0
     for generation in range(_MOST):
-        report("looking for a grasp that holds", min(generation / (_FEWEST + 1), 0.99))
-        score = rollout.carry(now, fixed=generation < _FIXED)
-        order = np.argsort(_cost(now, score, act), kind="stable")[: round(_KEPT * tried)]
+        report("looking for a grasp that holds", min((generation + since) / (_FIXED + 2 * _SAME), 0.99))
+        score = rollout.carry(now, fixed=fixed)
+        cost = _cost(now, score, act)
+        order = np.argsort(cost, kind="stable")[: round(_KEPT * tried)]
         best = float(score.held_share[order[0]])
-        if generation >= _FEWEST and best == 1.0:
-            return now[int(order[0])]
+        if fixed:
+            fixed = bool(score.held_share[order].min() < 1.0) and generation + 1 < _FIXED
+        else:
+            since = 0 if cost[order[0]] < least - _BETTER else since + 1
+            least = min(least, float(cost[order[0]]))
+            if best == 1.0 and since >= _SAME:
+                return now[int(order[0])]
+            if since >= _PATIENT:
+                break
         parents = rng.choice(order, tried - len(order))
         settled = rng.random(len(parents)) < _FROM_SETTLED
         starts = chosen(settled, score.settled[parents], now[parents])
@@ -68,8 +80,8 @@ def search_grasp(
 
 
 def _cost(grasps: GraspPose, score: RolloutScore, act: Act) -> Float[np.ndarray, "n"]:
-    unlikely = unlikeliness(grasps, act.held, act.hand, act.planes)
-    return 1 - score.held_share + _OFF_WAY * score.error + _UNLIKELY * unlikely
+    unlikely = unlikeliness(grasps, act.held, act.hand, act.planes, spun=act.spun)
+    return 1 - score.held_share + _OFF_WAY * (score.error + score.moved) + _UNLIKELY * unlikely
 
 
 def _changed(grasps: GraspPose, act: Act, scale: Float[np.ndarray, "n"], rng: np.random.Generator) -> GraspPose:

@@ -1,7 +1,7 @@
 """How a recorded hand takes an object into a grasp: it arrives with fingers open, closes, and carries.
 
-The recorded reach is off by as much as capture is, so it goes over into the grasp's place before the lift. The
-object's way, and with it the hand's from then on, are the recording's.
+The recorded reach is off by as much as capture is, so it goes over into the grasp's place before the lift, no earlier
+than the recorded hand is there. The object's way, and with it the hand's from then on, are the recording's.
 """
 
 import dataclasses
@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from envs.demonstrations.from_recording.grasp_pose import GraspPose, spin_of
+from envs.demonstrations.from_recording.grasp_pose import GraspPose, spins
 from envs.demonstrations.from_recording.observed import ObservedSequence
 from envs.demonstrations.from_recording.pregrasp import pregrasp
 from envs.demonstrations.scripted.script import minimum_jerk
@@ -19,9 +19,10 @@ from mjx_hand.objects.description import ObjectDescription
 from mjx_hand.objects.primitives import hull_planes
 from mjx_hand.rigid.rigid_hand import RigidHand
 
-# s before the lift: from when to when the wrist and the open fingers go over from the recorded reach to the grasp
-# (made late, a correction of centimetres would go through the object), and from when to when the fingers close.
-_ARRIVING, _CLOSING = (1.4, 0.75), (0.8, 0.4)
+# s: how long the wrist and the open fingers take from the recorded reach to the grasp (made late, a correction
+# of centimetres would go through the object), and how long the fingers to close at most, and at least.
+_ARRIVING, _CLOSING, _QUICKEST = 0.65, 0.4, 0.25
+_EARLIEST, _LATEST = 0.8, 0.05  # s before the lift: when fingers begin to close at the earliest, and are closed
 _CLEAR = 0.012  # m from open fingers to the object
 
 
@@ -35,6 +36,8 @@ class Act:
         held: how it then lies in the hand, as captured.
         hand: the twin's.
         object: a mesh.
+        spun: whether it may have been turned about its z axis by any angle, which was not seen.
+        support, support_position: half extents and centres of the boxes that it stands on beside the table (m).
     """
 
     observed: ObservedSequence
@@ -42,6 +45,9 @@ class Act:
     held: GraspPose
     hand: RigidHand
     object: ObjectDescription
+    spun: bool = True
+    support: Float[np.ndarray, "b 3"] = dataclasses.field(default_factory=lambda: np.zeros((0, 3)))
+    support_position: Float[np.ndarray, "b 3"] = dataclasses.field(default_factory=lambda: np.zeros((0, 3)))
 
     @functools.cached_property
     def planes(self) -> Float[np.ndarray, "h f 4"]:
@@ -51,16 +57,35 @@ class Act:
     @property
     def closed(self) -> int:
         """The first frame in which the fingers are closed; object and hand are as in the grasp from then on."""
-        return int(np.argmax(self._share(_CLOSING) >= 1.0))
+        return int(np.argmax(self.closing_share >= 1.0))
 
     @property
     def closing(self) -> int:
         """The first frame in which they close."""
-        return int(np.argmax(self._share(_CLOSING) > 0.0))
+        return int(np.argmax(self.closing_share > 0.0))
 
-    def _share(self, between: tuple[float, float]) -> Float[np.ndarray, "t"]:
-        """0 before, 1 after, minimum jerk between."""
-        begin, end = between
+    @property
+    def last_rest(self) -> int:
+        """The last frame before the lift."""
+        return int(np.searchsorted(self.observed.times, self.lifted - 1e-6)) - 1
+
+    @functools.cached_property
+    def closing_share(self) -> Float[np.ndarray, "t"]:
+        """How far the fingers are closed: from when the recorded hand is where it lifts from, if there is time."""
+        place = self.observed.hand_position[: self.last_rest + 1]
+        away = np.linalg.norm(place - place[-1], axis=1) > _CLEAR
+        there = self.observed.times[len(away) - int(np.argmax(away[::-1])) if away.any() else 0]
+        begin = float(np.clip(self.lifted - there, _QUICKEST + _LATEST, _EARLIEST))
+        return self._share(begin, max(begin - _CLOSING, _LATEST))
+
+    @functools.cached_property
+    def arriving_share(self) -> Float[np.ndarray, "t"]:
+        """How far the wrist has gone over from the recorded reach to the grasp: wholly when the fingers close."""
+        arrived = self.lifted - float(self.observed.times[max(self.closing - 1, 0)])
+        return self._share(min(arrived + _ARRIVING, self.lifted), arrived)
+
+    def _share(self, begin: float, end: float) -> Float[np.ndarray, "t"]:
+        """0 until `begin` s before the lift, 1 from `end` s before it on, minimum jerk between."""
         return minimum_jerk((self.observed.times - self.lifted + begin) / (begin - end))
 
 
@@ -88,21 +113,24 @@ class GraspTrajectory:
 
 
 def grasp_trajectory(act: Act, grasps: GraspPose) -> GraspTrajectory:
-    """How the recorded hand takes the object into each of n grasps."""
+    """How the recorded hand takes the object into each of n grasps: along its reach, which is put beside the recorded
+    one by as much as the grasp is."""
     observed, hand = act.observed, act.hand
-    arriving, closing = (act._share(span)[:, None] for span in (_ARRIVING, _CLOSING))
+    arriving, closing = act.arriving_share[:, None], act.closing_share[:, None]
     # An object that looks the same from all sides was turned about its axis otherwise than it seemed, and not the hand.
-    spins = [spin_of(act.held.rotation.T @ rotation) for rotation in grasps.rotation]
-    spun = Rotation.from_rotvec(np.array(spins)[:, None] * [0.0, 0.0, 1.0]).as_matrix()
+    spin = spins(grasps, act.held) if act.spun else np.zeros(len(grasps.angles))
+    spun = Rotation.from_rotvec(spin[:, None] * [0.0, 0.0, 1.0]).as_matrix()
     rotation = observed.rotation @ spun[:, None]
     wrist_rotation = rotation @ np.swapaxes(grasps.rotation, 1, 2)[:, None]
     wrist_position = observed.position - np.einsum("ntij,nj->nti", wrist_rotation, grasps.position)
+    beside = wrist_position[:, act.last_rest, None] - observed.hand_position[act.last_rest]
+    reach = observed.hand_position + arriving * beside
     spread = pregrasp(grasps, hand, act.planes, _CLEAR).angles[:, None]
     angles = observed.angles + arriving * (spread - observed.angles) + closing * (grasps.angles[:, None] - spread)
     return GraspTrajectory(
         angles=np.clip(angles, hand.hinge_lower, hand.hinge_upper),
         wrist_rotation=_turned(observed.hand_rotation, wrist_rotation, arriving),
-        wrist_position=observed.hand_position + arriving * (wrist_position - observed.hand_position),
+        wrist_position=reach + closing * (wrist_position - reach),
         rotation=rotation,
         position=observed.position,
     )

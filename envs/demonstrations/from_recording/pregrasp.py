@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from envs.demonstrations.from_recording.grasp_pose import GraspPose, capsule_gaps
+from envs.demonstrations.from_recording.grasp_pose import GraspPose, capsule_axes, linear_gaps
 from mjx_hand.rigid.rigid_hand import RigidHand, on_device
 
 _STEPS, _STEP, _DAMPING = 20, 0.5, 0.02  # of damped least squares (m/rad)
@@ -29,7 +29,7 @@ def _open_all(
 
     def one(row: tuple[Array, Array, Array]) -> Array:
         def missing(q: Array) -> tuple[Array, Array]:
-            gaps = capsule_gaps(q, row[1], row[2], hand, planes)
+            gaps = linear_gaps(capsule_axes(q, row[1], row[2], hand), jnp.asarray(hand.capsule_radius), planes)
             short = jnp.where(fingers, jnp.maximum(clearance - gaps, 0.0), 0.0)
             return short, short
 

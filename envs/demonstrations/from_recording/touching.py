@@ -11,7 +11,13 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.ndimage import median_filter
 
-from envs.demonstrations.from_recording.grasp_pose import GraspPose, capsule_axes, capsule_gaps, last_phalanges
+from envs.demonstrations.from_recording.grasp_pose import (
+    GraspPose,
+    capsule_axes,
+    capsule_gaps,
+    last_phalanges,
+    linear_gaps,
+)
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.motion.resample import matrix_quaternions, quaternion_matrices
 from mjx_hand.motion.smooth import smooth_rows
@@ -123,7 +129,7 @@ def _solve(
 
         def residual(x: Array) -> tuple[Array, Array]:
             q, r, p = placed(x)
-            gaps = _linear_gaps(capsule_axes(q, r, p, hand), jnp.asarray(hand.capsule_radius), planes)
+            gaps = linear_gaps(capsule_axes(q, r, p, hand), jnp.asarray(hand.capsule_radius), planes)
             outside = jnp.maximum(q - hand.hinge_upper, 0) + jnp.maximum(hand.hinge_lower - q, 0)
             free = jnp.zeros_like(gaps).at[tips].set(share)
             rows = jnp.concatenate(
@@ -153,18 +159,6 @@ def _solve(
         return placed(jax.lax.fori_loop(0, _STEPS, step, first)[0])
 
     return jax.lax.map(one, (angles, rotation, position, shares), batch_size=8)
-
-
-def _linear_gaps(points: Float[Array, "c n 3"], radius: Array, planes: Array) -> Float[Array, "c"]:
-    """`capsule_gaps`, whose slopes go through the one plane that decides and not through all of them."""
-    beyond = jnp.einsum("cnk,hfk->cnhf", jax.lax.stop_gradient(points), planes[..., :3]) + planes[..., 3]
-    outside = beyond.max(axis=-1)
-    piece = jnp.argmin(outside, axis=-1)
-    which = jnp.argmin(outside.min(axis=-1), axis=-1)
-    rows = jnp.arange(len(points))
-    piece = piece[rows, which]
-    plane = planes[piece, jnp.argmax(beyond[rows, which, piece], axis=-1)]
-    return jnp.sum(points[rows, which] * plane[:, :3], axis=-1) + plane[:, 3] - radius
 
 
 def _chunks(*arrays: np.ndarray) -> list[tuple[Array, ...]]:

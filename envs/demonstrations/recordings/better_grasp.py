@@ -11,6 +11,7 @@ from envs.demonstrations.from_recording.grasp_pose import GraspPose, last_phalan
 from envs.demonstrations.from_recording.grasp_search import search_grasp
 from envs.demonstrations.from_recording.grasp_trajectory import Act, grasp_trajectory
 from envs.demonstrations.from_recording.observed import ObservedSequence
+from envs.demonstrations.from_recording.shared_way import shared_way
 from envs.demonstrations.from_recording.touching import gaps_over_time
 from envs.demonstrations.observation.settled_path import held_rotation, shortest_turn
 from envs.demonstrations.recordings.recorded_demonstration import Figures, Recorded
@@ -27,7 +28,7 @@ from mjx_hand.pytree import replace
 _FORCE = 4.5  # of `grip_force_of`: what the grasp that is searched for must hold with
 _ARRIVING = (0.45, 0.1)  # s before the lift: where the hand is at the object and has not moved it
 _PUT_DOWN = "the grasp that was searched for ends where the object is first put down"
-_EARLIEST = 1.5  # s before the lift that the approach takes
+_EARLIEST = 0.7  # s before the lift that the approach takes
 
 
 def better_grasp(
@@ -50,14 +51,20 @@ def better_grasp(
     held = dataclasses.replace(held, rotation=held.rotation @ frame.T)
     described = recorded.demonstration.object
     turned = replace(described, hulls=described.hulls @ frame.T)
+    spun = recorded.handled.path.noisy
+    corners = turned.hulls.reshape(-1, 3)
+    met, wrist = shared_way(held, begin, corners, rests=end < len(carried), spun=spun)
     act = Act(
-        observed=held,
+        observed=met,
         lifted=lifted,
-        held=_held(held, begin),
+        held=_held(met, begin, wrist),
         hand=recorded.observed.hand,
         object=turned,
+        spun=spun,
+        support=recorded.demonstration.support,
+        support_position=recorded.demonstration.support_position,
     )
-    candidates = solve_grasp_poses(act.held, act.hand, act.planes, spun=recorded.handled.path.noisy)
+    candidates = solve_grasp_poses(act.held, act.hand, act.planes, spun=spun)
     force = settings.force or grip_force_of(described.mass, described.friction, _FORCE)
     trajectory = grasp_trajectory(act, search_grasp(act, candidates, force, report)[None])
     rotation = trajectory.rotation[0] @ frame
@@ -92,6 +99,7 @@ def _measured(
     lies = GraspPose(made.motion.angles, into @ rotation, np.einsum("tij,tj->ti", into, offset))
     gaps = gaps_over_time(lies, observed.hand, hull_planes(made.object.hulls))
     moved = np.linalg.norm(made.motion.wrist_position - observed.recorded_hand[:end], axis=1)
+    way = made.object_pose[:, :3] - observed.recorded_object[:end]
     turned = Rotation.from_matrix(np.swapaxes(observed.sequence.hand_rotation[:end], 1, 2) @ wrist).magnitude()
     tips = last_phalanges(observed.hand)
     behind = figures.first + round(end * figures.rate / made.motion.fps)  # of the recording, after the first carrying
@@ -102,6 +110,7 @@ def _measured(
         depth=max(-float(gaps.min()), 0.0),
         hand_moved=float(moved.mean()),
         hand_turned=float(turned.mean()),
+        way_moved=float(np.linalg.norm(way, axis=1)[carried].mean()),
         angles_moved=float(np.abs(made.motion.angles - observed.sequence.angles[:end]).mean()),
         carried=1.0,  # in the search, which keeps no other
         lost=None,
@@ -119,21 +128,18 @@ def _upright_frame(recorded: Recorded) -> Float[np.ndarray, "3 3"]:
     return np.stack([x, np.cross(up, x), up])
 
 
-def _held(observed: ObservedSequence, lifted: int) -> GraspPose:
+def _held(observed: ObservedSequence, lifted: int, wrist: Float[np.ndarray, "3"]) -> GraspPose:
     """How the object lies in the hand that carries it: the robust mean, its axis half way to how the hand arrived.
 
-    Both are measured, as badly, and in a firm grasp they are one.
+    Both are measured, as badly, and in a firm grasp they are one. The wrist is where it is beside the object.
     """
-    into = np.swapaxes(observed.hand_rotation, 1, 2)
-    lies = Rotation.from_matrix((into @ observed.rotation)[lifted:])
-    placed = np.einsum("tij,tj->ti", into, observed.position - observed.hand_position)[lifted:]
+    lies = Rotation.from_matrix((np.swapaxes(observed.hand_rotation, 1, 2) @ observed.rotation)[lifted:])
     mean, near = held_rotation(lies)
     times = observed.times[lifted] - observed.times
     arriving = observed.hand_rotation[(times < _ARRIVING[0]) & (times > _ARRIVING[1]), 2].mean(axis=0)
     arriving /= np.linalg.norm(arriving)
     half = shortest_turn(mean.apply([0.0, 0.0, 1.0]), arriving, share=0.5)
+    rotation = (half * mean).as_matrix()
     return GraspPose(
-        angles=np.median(observed.angles[lifted:][near], axis=0),
-        rotation=(half * mean).as_matrix(),
-        position=np.median(placed[near], axis=0),
+        angles=np.median(observed.angles[lifted:][near], axis=0), rotation=rotation, position=-rotation @ wrist
     )

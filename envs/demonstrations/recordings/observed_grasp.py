@@ -37,7 +37,7 @@ class ObservedGrasp:
         carried: frames in which the hand has it.
         settled: the way at the recording's rate.
         shape, hand: of the person.
-        recorded_hand: where the recording has the wrist (m), in the same axes.
+        recorded_hand, recorded_object: where the recording has the wrist and the object (m), in the same axes.
     """
 
     sequence: ObservedSequence
@@ -46,6 +46,7 @@ class ObservedGrasp:
     shape: Float[np.ndarray, "s"]
     hand: RigidHand
     recorded_hand: Float[np.ndarray, "t 3"]
+    recorded_object: Float[np.ndarray, "t 3"]
 
 
 def observed_grasp(handled: Handled, settings: RecordingSettings) -> ObservedGrasp:
@@ -79,12 +80,15 @@ def observed_grasp(handled: Handled, settings: RecordingSettings) -> ObservedGra
         position=settled.position,
     )
     sequence = resampled(raw, 0.0, settings.rate, settings.cutoff)
-    recorded = dataclasses.replace(raw, hand_position=position - settled.origin)
+    recorded = dataclasses.replace(
+        raw, hand_position=position - settled.origin, position=path.position - settled.origin
+    )
     recorded = resampled(recorded, 0.0, settings.rate, settings.cutoff)
     lowest = sequence.position[:, 2] + handled.solid.lowest(sequence.rotation, np.eye(3)[2])
     sequence.position[:, 2] += np.maximum(-lowest, 0.0)  # the filter rounds off how an object leaves the table
     before = np.clip((sequence.times * motion.fps).round().astype(int), 0, len(act.labels) - 1)
-    return ObservedGrasp(sequence, act.labels[before] == CARRIED, settled, shape, hand, recorded.hand_position)
+    carried = act.labels[before] == CARRIED
+    return ObservedGrasp(sequence, carried, settled, shape, hand, recorded.hand_position, recorded.position)
 
 
 def _on_hinges(motion: Motion, model: HandModel) -> tuple[np.ndarray, RigidHand, np.ndarray]:

@@ -58,6 +58,7 @@ class Figures:
         hand_moved, hand_turned: mean change of the wrist (m, rad), and of the hinges:
         angles_moved: rad.
         object_moved, object_turned: largest change of the object's place (m) and orientation (rad) where it rests.
+        way_moved: mean change of the object's place while it is carried (m).
         bridged: frames whose orientation of the object was not believed.
         left_out: reasons to frames of the recording that are not in the demonstration.
         carried: share of its frames up to which the twin carries it with nothing learned, and the frame.
@@ -88,6 +89,7 @@ class Figures:
     angles_moved: float
     object_moved: float
     object_turned: float
+    way_moved: float
     bridged: int
     left_out: Mapping[str, Sequence[tuple[int, int]]]
     carried: float = 0.0
@@ -181,6 +183,7 @@ def _demonstration(
         angles_moved=_mean(np.abs(held.angles - lies.angles)),
         object_moved=float(np.linalg.norm(settled.moved[rests], axis=1).max(initial=0.0)),
         object_turned=float(Rotation.from_matrix(settled.turned).magnitude().max()),
+        way_moved=_mean(np.linalg.norm(sequence.position - observed.recorded_object, axis=1)[observed.carried]),
         bridged=settled.bridged,
         left_out=act.left_out,
     )

@@ -75,7 +75,7 @@ def recorded_set(settings: RecordingSettings, report: Report = lambda what, shar
             continue
         demonstrations.append(better)
         figures.append(dataclasses.replace(told, road=SEARCHED))
-    demonstrations, figures = _of_one_hand(demonstrations, figures)
+    demonstrations, figures = of_one_hand(demonstrations, figures)
     if not demonstrations:
         raise InputError(_none(settings.path, refused))
     return RecordedSet(demonstrations, figures, refused)
@@ -96,7 +96,7 @@ def _readable(
     return found, refused
 
 
-def _of_one_hand(
+def of_one_hand(
     demonstrations: Sequence[Demonstration], figures: Sequence[Figures]
 ) -> tuple[list[Demonstration], list[Figures]]:
     """All by the hand that most are of, the others as mirror images: a policy is one hand's."""

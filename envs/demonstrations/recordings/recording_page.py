@@ -63,6 +63,7 @@ def _steps(f: Figures, d: Demonstration) -> list[tuple[str, str]]:
         ("up", f.up),
         ("supports", f"{len(f.supports)}, at {supports}"),
         ("object where it rests", f"moved {1e3 * f.object_moved:.1f} mm, turned {np.rad2deg(f.object_turned):.1f}°"),
+        ("object's way while it is carried", f"moved {1e3 * f.way_moved:.1f} mm on average"),
         ("orientations not believed", f"{f.bridged} frames"),
         ("convex pieces", str(f.pieces)),
         ("mass", f"{1e3 * f.mass:.0f} g ({f.how_heavy})"),

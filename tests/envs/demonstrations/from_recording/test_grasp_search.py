@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from envs.demonstrations.from_recording.grasp_pose import GraspPose, capsule_gaps
-from envs.demonstrations.from_recording.grasp_rollout import GraspRollout
+from envs.demonstrations.from_recording import grasp_search
+from envs.demonstrations.from_recording.grasp_pose import GraspPose, capsule_gaps, joined, spins, unlikeliness
+from envs.demonstrations.from_recording.grasp_rollout import GraspRollout, RolloutScore
 from envs.demonstrations.from_recording.grasp_search import search_grasp
 from envs.demonstrations.from_recording.grasp_trajectory import Act, grasp_trajectory
 from envs.demonstrations.from_recording.observed import ObservedSequence
@@ -92,17 +93,89 @@ def test_a_trajectory_begins_as_recorded_and_ends_in_the_grasp(act, good):
     assert np.linalg.norm(np.diff(trajectory.wrist_position[0], axis=0), axis=1).max() < 0.01  # 0.5 m/s
 
 
+def test_a_hand_that_comes_late_is_not_led_there_early(act, good):
+    """The recorded hand is where it lifts from 0.2 s before the lift: with that very grasp nothing is to be moved."""
+    late = 0.25 * np.clip(LIFTED - 0.2 - act.observed.times, 0.0, 0.4)
+    truth = act.observed.position - np.einsum("tij,j->ti", act.observed.hand_rotation, good.position)
+    observed = dataclasses.replace(act.observed, hand_position=truth + late[:, None] * [0.0, 0.0, 1.0])
+    trajectory = grasp_trajectory(dataclasses.replace(act, observed=observed, held=good), good[None])
+    moved = np.linalg.norm(trajectory.wrist_position[0] - observed.hand_position, axis=1)
+    assert moved.max() < 0.03
+    assert moved.mean() < 0.003
+
+
+def test_a_hand_turned_where_it_is_is_not_moved_and_a_turned_object_turns_alone(act, good, planes):
+    """The wrist's place beside the object counts, not the object's in the wrist's frame, which any turn moves."""
+    wrist, turn = good.wrist, Rotation.from_rotvec([0.3, 0.0, 0.0]).as_matrix()
+    turned = good.rotation @ turn.T  # the hand, in the object's frame, by the turn
+    there = GraspPose(good.angles, turned, -turned @ wrist)
+    assert np.linalg.norm(there.position - good.position) > 0.02
+    np.testing.assert_allclose(there.wrist, wrist, atol=1e-12)
+    np.testing.assert_allclose(spins(there[None], good), 0, atol=0.05)
+    spun = Rotation.from_rotvec([0.0, 0.0, 2.0]).as_matrix()
+    other = GraspPose(good.angles, good.rotation @ spun, good.position)
+    np.testing.assert_allclose(spins(other[None], good), 2.0, atol=1e-9)
+    slab = np.array(
+        [[[0.0, 0.0, 1.0, -0.001], [0.0, 0.0, -1.0, -0.001]]]
+    )  # the same whichever way it is turned about z
+    same, moved = unlikeliness(joined([good[None], other[None]]), good, act.hand, slab)
+    assert moved == pytest.approx(np.hypot(same, 2.0 / 0.8), rel=1e-3)
+
+
 def test_a_grasp_off_the_object_is_lost_and_a_good_one_is_not(act, good):
+    """Of a cube that stands on a block."""
+    block = np.array([0.05, 0.05, 0.04])
+    up = np.array([0.0, 0.0, 2 * block[2]])
+    raised = {name: getattr(act.observed, name) + up for name in ("position", "hand_position")}
+    on_block = dataclasses.replace(
+        act,
+        observed=dataclasses.replace(act.observed, **raised),
+        support=block[None],
+        support_position=np.array([[0.0, 0.0, block[2]]]),
+    )
     pair = GraspPose(
         *(np.stack([a, b]) for a, b in zip(dataclasses.astuple(good), dataclasses.astuple(good), strict=True))
     )
     pair = dataclasses.replace(pair, position=pair.position + np.array([[0.0, 0.0, 0.0], [0.0, -0.04, 0.0]]))
     for fixed in (False, True):
-        score = GraspRollout(act, FORCE, 2).carry(pair, fixed=fixed)
+        score = GraspRollout(on_block, FORCE, 2).carry(pair, fixed=fixed)
         assert score.held_share[0] == 1.0
         assert score.error[0] < 0.01
         assert score.held_share[1] < 0.95
         assert np.linalg.norm(score.settled.position[0] - good.position) < 0.01
+
+
+@pytest.mark.parametrize("carries", [True, False])
+def test_the_search_ends_when_nothing_better_comes(act, good, monkeypatch, carries):
+    """With a stand-in for the engine that judges by the place alone, and nothing to compile."""
+    flags = []
+
+    class Judge:
+        def __init__(self, act, force, count):
+            pass
+
+        def carry(self, grasps, *, fixed):
+            flags.append(fixed)
+            off = np.linalg.norm(grasps.position - good.position, axis=1)
+            share = np.clip(1.0 - 10 * np.maximum(off - 0.006, 0), 0, 1 if carries else 0.5)
+            return RolloutScore(held_share=share, error=0.0 * off, moved=off, settled=grasps)
+
+    monkeypatch.setattr(grasp_search, "GraspRollout", Judge)
+    monkeypatch.setattr(grasp_search, "pregrasp", lambda grasps, hand, planes, clearance: grasps)
+    monkeypatch.setattr(grasp_search, "unlikeliness", lambda grasps, *rest, **options: np.zeros(len(grasps.angles)))
+    if carries:
+        found = search_grasp(act, act.held[None], FORCE, tried=60)
+        assert (
+            np.linalg.norm(found.position - good.position) < 0.006 < np.linalg.norm(act.held.position - good.position)
+        )
+        assert flags[0]
+        assert not any(flags[-4:])
+        assert len(flags) < 20
+    else:
+        with pytest.raises(InputError, match="the best, 50 % of the way"):
+            search_grasp(act, act.held[None], FORCE, tried=60)
+        assert sum(flags) == 8
+        assert len(flags) < 40
 
 
 @pytest.mark.slow
