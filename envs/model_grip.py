@@ -1,5 +1,6 @@
 """Grip offsets of any body, by MuJoCo's own distances and Jacobians; as `envs.grip` has them for a human hand."""
 
+import itertools
 from collections.abc import Iterator, Sequence
 
 import mujoco
@@ -17,22 +18,32 @@ NEAR = 0.007  # m: a link nearer than this is taken to touch
 _SHARP = 0.001  # m, over which that fades
 _FAR = 0.02  # m, beyond which nobody asks how far
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
+_SIDES = 32  # of a cylinder's rim
+_APART = 1e-4  # m that a link is moved out to see which way the surface faces where it just touches
 
 
 class Touch:
     """Where a hand and an object are nearest to each other, link by link, in one scene.
 
+    Args:
+        model: the scene.
+        body: the hand.
+        palm: with the links of no finger, too.
+
     Attributes:
         links: those of fingers that have a shape to touch with.
-        fingers: of each of them.
+        fingers: of each of them, "" of the palm's.
     """
 
-    def __init__(self, model: mujoco.MjModel, body: Body):
+    def __init__(self, model: mujoco.MjModel, body: Body, *, palm: bool = False):
         self.model, self.data = model, mujoco.MjData(model)
-        self.links = tuple(dict.fromkeys(c.link for c in body.contacts if c.finger))
+        self.links = tuple(dict.fromkeys(c.link for c in body.contacts if c.finger or palm))
         self.fingers = tuple(next(c.finger for c in body.contacts if c.link == link) for link in self.links)
         self._hand = [[model.geom(c.name).id for c in body.contacts if c.link == link] for link in self.links]
         self._bodies = [model.body(link).id for link in self.links]
+        shapes = {geom: _corners(model, geom) for geoms in self._hand for geom in geoms}
+        self._corners = {geom: corners for geom, (corners, _) in shapes.items()}
+        self._round = {geom: radius for geom, (_, radius) in shapes.items()}
         self._object = np.flatnonzero(model.geom_bodyid == model.body(OBJECT).id).tolist()
 
     def place(self, coordinates: Float[np.ndarray, "m"], object_pose: Float[np.ndarray, "7"]) -> None:
@@ -45,15 +56,34 @@ class Touch:
         """Of each link that is nearer than `most` (m): its number, the gap, its point there, and the way in (world)."""
         ends = np.zeros(6)
         for number, geoms in enumerate(self._hand):
-            best: tuple[float, np.ndarray] | None = None
+            best: tuple[float, np.ndarray, tuple[int, int]] | None = None
             for geom in geoms:
                 for other in self._object:
                     gap = mujoco.mj_geomDistance(self.model, self.data, geom, other, most, ends)
                     if gap < most and (best is None or gap < best[0]):
-                        best = gap, ends.copy()
-            if best is not None and abs(best[0]) > 1e-9:
-                gap, found = best
-                yield number, gap, found[:3], (found[3:] - found[:3]) / gap
+                        best = gap, ends.copy(), (geom, other)
+            if best is not None:
+                gap, found, pair = best
+                inward = (found[3:] - found[:3]) / gap if abs(gap) > _APART / 10 else self._inward(*pair)
+                yield number, gap, found[:3], inward
+
+    def _inward(self, geom: int, other: int) -> Float[np.ndarray, "3"]:
+        """The way into the object where a geom just touches it: there the two nearest points are one and do not say."""
+        here, ends = self.data.geom_xpos[geom].copy(), np.zeros(6)
+        out = here - self.data.geom_xpos[other]
+        self.data.geom_xpos[geom] += _APART * out / max(float(np.linalg.norm(out)), _APART)
+        gap = mujoco.mj_geomDistance(self.model, self.data, geom, other, 1.0, ends)
+        self.data.geom_xpos[geom] = here
+        return (ends[3:] - ends[:3]) / gap
+
+    def foremost(self, number: int, way: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+        """A link's point (m, world) that is farthest along a unit way."""
+        points = []
+        for geom in self._hand[number]:
+            turn, own = self.data.geom_xmat[geom].reshape(3, 3), self._corners[geom]
+            corner = own[np.argmax(own @ (turn.T @ way))]
+            points.append(self.data.geom_xpos[geom] + turn @ corner + self._round[geom] * way)
+        return max(points, key=lambda point: float(point @ way))
 
     def jacobian(self, number: int, point: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 m"]:
         """How a point (m, world) of a link moves with the hand's coordinates."""
@@ -70,6 +100,25 @@ class Touch:
         """The reverse of `on_link`."""
         body = self._bodies[number]
         return self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ place
+
+
+def _corners(model: mujoco.MjModel, geom: int) -> tuple[Float[np.ndarray, "c 3"], float]:
+    """Corners (m, the geom's frame), and the radius around them, of which a geom is the convex hull."""
+    kind, size = model.geom_type[geom], model.geom_size[geom]
+    if kind == mujoco.mjtGeom.mjGEOM_MESH:
+        mesh = model.geom_dataid[geom]
+        first = model.mesh_vertadr[mesh]
+        return model.mesh_vert[first : first + model.mesh_vertnum[mesh]].astype(float), 0.0
+    signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+        return np.zeros((1, 3)), float(size[0])
+    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+        return np.array([[0.0, 0.0, -size[1]], [0.0, 0.0, size[1]]]), float(size[0])
+    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        angles = np.linspace(0, 2 * np.pi, _SIDES, endpoint=False)
+        rim = np.stack([np.cos(angles), np.sin(angles)], 1) * size[0]
+        return np.concatenate([np.insert(rim, 2, end * size[1], axis=1) for end in (-1.0, 1.0)]), 0.0
+    return signs * size, 0.0  # a box
 
 
 def model_grips(

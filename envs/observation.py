@@ -32,20 +32,20 @@ def wrist_rotation(turns: Float[Array, "3"], base: Float[Array, "3 3"]) -> Float
     return base @ x @ y @ z
 
 
-def residual_scale(task: Task, hand: HandNames = HUMAN) -> Float[np.ndarray, "u"]:
-    """What a residual of 1 is worth for each target (m, rad)."""
+def residual_scale(task: Task, hand: HandNames = HUMAN, reach: float = 1.0) -> Float[np.ndarray, "u"]:
+    """What a residual of 1 is worth for each target (m, rad), of a hand with this `Body.reach`."""
     return np.concatenate(
         [
             np.full(3, task.residual_scale_wrist_position),
             np.full(3, task.residual_scale_wrist_rotation),
-            np.full(len(hand.joints), task.residual_scale_fingers),
+            np.full(len(hand.joints), reach * task.residual_scale_fingers),
         ]
     )
 
 
-def observed_features(task: Task, hand: HandNames = HUMAN) -> tuple[Feature, ...]:
+def observed_features(task: Task, hand: HandNames = HUMAN, reach: float = 1.0) -> tuple[Feature, ...]:
     """What a policy of this task and hand sees, in order."""
-    table = feature_table(residual_scale(task, hand), task.lookahead, OBJECT_KINDS, hand)
+    table = feature_table(residual_scale(task, hand, reach), task.lookahead, OBJECT_KINDS, hand)
     return table if task.observe_properties else tuple(feature for feature in table if feature.name not in _PROPERTIES)
 
 
@@ -61,7 +61,7 @@ def observe(
 ) -> Float[Array, "o"]:
     """The observation at `frame` of a demonstration; `displacement` is where the wrist's path goes with the object."""
     seen = _seen(reference, task, body, demonstration, frame, physics, residual, displacement)
-    table = observed_features(task, body.names)
+    table = observed_features(task, body.names, body.reach)
     offset, scale = offsets_and_scales(table)
     features = jnp.concatenate([feature.value(seen).ravel() for feature in table])
     return jnp.clip((features - offset) * scale, -OBSERVATION_LIMIT, OBSERVATION_LIMIT)

@@ -19,7 +19,7 @@ class Task:
     Attributes:
         substeps: physics steps (4 ms) a control step.
         residual_scale_wrist_position, residual_scale_wrist_rotation, residual_scale_fingers: how far a residual of 1
-            moves the wrist's slides, its turns and the hinges.
+            moves the wrist's slides, its turns and a human hand's hinges; those of stiffer hands less (`Body.reach`).
         smoothing: tau of the residual's filter, residual <- tau residual + (1 - tau) scale action.
         rewards: weights of the reward's terms (`envs.rewards`).
         reward_position_alpha, reward_rotation_alpha: alpha_p (1/m) and alpha_r (1/rad) of the terms

@@ -224,9 +224,8 @@ class TrackingEnv(Env):
     ) -> tuple[Int[Array, ""], Float[Array, "u"], Float[Array, "u"]]:
         """The next frame, the residual there, and what the actuators are told on the way (m, rad)."""
         task = self.task
-        residual = (
-            task.smoothing * twin.residual + (1 - task.smoothing) * residual_scale(task, self.body.names) * action
-        )
+        scale = residual_scale(task, self.body.names, self.body.reach)
+        residual = task.smoothing * twin.residual + (1 - task.smoothing) * scale * action
         frame = jnp.minimum(twin.frame + 1, self.reference.length[twin.demonstration] - 1)
         target = self.reference.controls[twin.demonstration, frame] + residual
         if twin.episode is not None:
@@ -268,7 +267,7 @@ class TrackingEnv(Env):
             tips=twin.physics.sensordata.reshape(-1, 3),
             tips_reference=self.reference.tips[place],
             action=action,
-            change=moved / residual_scale(self.task, self.body.names),
+            change=moved / residual_scale(self.task, self.body.names, self.body.reach),
         )
 
     def _errors(self, twin: Twin) -> tuple[Array, Array]:

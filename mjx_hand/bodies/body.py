@@ -83,6 +83,14 @@ class Body:
         """What its numbers are called."""
         return HandNames(self.joints, self.fingers)
 
+    @cached_property
+    def reach(self) -> float:
+        """How far a residual moves its joints, over a human hand's: as large a share of their torque limits."""
+        if self.rigid is not None:
+            return 1.0
+        own, human = (np.median(gains.force_limit / gains.stiffness) for gains in (self.gains, Gains()))
+        return float(own / human)
+
     @property
     def num_targets(self) -> int:
         """How many numbers are commanded."""

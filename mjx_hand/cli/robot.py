@@ -18,6 +18,7 @@ from mjx_hand.retarget.sequence import rigid_hand_of
 from mjx_hand.robots.hand_axes import check_goes_with
 from mjx_hand.robots.motion_keypoints import motion_keypoints
 from mjx_hand.robots.palm_frame import in_palm
+from mjx_hand.robots.robot_file import check_mjcf
 from mjx_hand.robots.robot_hand import load_robot, robot_objective, urdf_of
 from mjx_hand.robots.robot_motion import RobotMotion, save_robot_motion, vector_errors
 from mjx_hand.robots.solver.kinematic_tree import KinematicTree, joint_values
@@ -30,6 +31,7 @@ def robot(
     *,
     robot: str,
     urdf: Path | None = None,
+    mjcf: Path | None = None,
     out: Path | None = None,
     build: Path | None = None,
     objective: Literal["vector", "dexpilot", "position"] = "vector",
@@ -46,6 +48,7 @@ def robot(
         recording: keypoints (.json, .npz or .csv) or a motion of any format that mjx-hand retarget reads.
         urdf: the robot hand's URDF; without it the one that the description names. Its meshes are needed by --build
             only.
+        mjcf: an MJCF in the place of the URDF.
         robot: its description: a name in mjx_hand/robots/descriptions, or the path of a file like those.
         out: the .npz to write: the values of all joints.
         build: the folder to write the hand to, as MJCF with meshes, in place of moving it: on a wrist that six joints
@@ -61,6 +64,11 @@ def robot(
             the bone of each link that has no other shape.
         self_collision: let the links of the model of --build collide with each other, except neighbours.
     """
+    if mjcf is not None:
+        if urdf is not None:
+            raise InputError("--urdf and --mjcf are given; give one of them")
+        check_mjcf(mjcf)
+        urdf = mjcf
     if build is not None:
         if recording is not None or out is not None:
             raise InputError("--build writes the robot hand itself; give no recording and no --out with it")

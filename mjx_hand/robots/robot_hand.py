@@ -14,6 +14,7 @@ import numpy as np
 from mjx_hand.capture.keypoints.layouts import KEYPOINTS
 from mjx_hand.errors import InputError
 from mjx_hand.files.safe_yaml import read_yaml, shown
+from mjx_hand.robots.robot_file import check_mjcf
 from mjx_hand.robots.robot_urdf import robot_tree
 from mjx_hand.robots.solver.kinematic_tree import BASE, KinematicTree
 from mjx_hand.robots.solver.objectives import KINDS, Objective, dexpilot_pairs
@@ -21,7 +22,7 @@ from mjx_hand.robots.solver.objectives import KINDS, Objective, dexpilot_pairs
 ROBOTS = Path(__file__).parent / "descriptions"
 SMALLEST, LARGEST = 0.05, 20.0  # of a robot over a person: from a toy to an excavator
 _NEEDED = ("palm", "tips", "scaling", "fingers", "palmar")
-_KNOWN = (*_NEEDED, "joints", "vectors", "urdf", "force_limits", "stiffness")
+_KNOWN = (*_NEEDED, "joints", "vectors", "urdf", "mjcf", "force_limits", "stiffness")
 _MOST = 1e4  # N m, N m/rad
 
 
@@ -36,7 +37,7 @@ class RobotHand:
         joints: further links and their keypoints.
         all_vectors: whether the objective `vector` follows `joints` too, not only `tips`.
         scaling: the robot's size over a person's.
-        urdf: its file, where the description says one.
+        urdf: its file, where the description says one; a URDF, or an MJCF where it calls it so.
         force_limits, stiffness: of single joints (N m, N m/rad; of sliding ones N, N/m), in the place of what
             `robots.model.gains` would have.
         fingers, palmar: directions in the frame of the URDF's root link, unit and at right angles: where straight
@@ -108,25 +109,32 @@ def _checked(path: Path, content: Any) -> RobotHand:
         scaling=float(scaling),
         fingers=fingers,
         palmar=palmar,
-        urdf=_urdf(path, content.get("urdf")),
+        urdf=_model_file(path, content),
         force_limits=_by_joint(path, "force_limits", content.get("force_limits", {})),
         stiffness=_by_joint(path, "stiffness", content.get("stiffness", {})),
     )
 
 
-def _urdf(path: Path, value: Any) -> Path | None:
-    """Where a description's URDF is: beside it, or with `PACKAGE:PATH` in an installed Python package."""
-    if value is None:
+def _model_file(path: Path, content: dict[str, Any]) -> Path | None:
+    """Where a description's URDF or MJCF is: beside it, or with `PACKAGE:PATH` in an installed Python package."""
+    given = [name for name in ("urdf", "mjcf") if content.get(name) is not None]
+    if not given:
         return None
+    if len(given) > 1:
+        raise InputError(f"{path}: has urdf and mjcf; give one of them")
+    value = content[given[0]]
     if not isinstance(value, str) or not value:
-        raise InputError(f"{path}: urdf is {shown(value)}; give a path from this file on, or PACKAGE:PATH")
+        raise InputError(f"{path}: {given[0]} is {shown(value)}; give a path from this file on, or PACKAGE:PATH")
     package, found, inside = value.partition(":")
     if not found:
-        return path.parent / value
-    spec = find_spec(package) if package.isidentifier() else None
-    if spec is None or spec.origin is None:
-        return Path(value)  # which is said to be absent when it is read
-    return Path(spec.origin).parent / inside
+        file = path.parent / value
+    else:
+        spec = find_spec(package) if package.isidentifier() else None
+        folder = None if spec is None or spec.origin is None else Path(spec.origin).parent
+        file = Path(value) if folder is None else folder / inside  # which is said to be absent when it is read
+    if given == ["mjcf"] and file.is_file():
+        check_mjcf(file)
+    return file
 
 
 def _by_joint(path: Path, name: str, value: Any) -> dict[str, float]:
@@ -141,7 +149,7 @@ def _by_joint(path: Path, name: str, value: Any) -> dict[str, float]:
 
 
 def urdf_of(robot: RobotHand, given: str | Path | None = None) -> Path:
-    """The robot's URDF: the one given, or the description's own.
+    """The robot's URDF or MJCF: the one given, or the description's own.
 
     Raises:
         InputError: neither is there.
@@ -149,11 +157,13 @@ def urdf_of(robot: RobotHand, given: str | Path | None = None) -> Path:
     if given is not None:
         return Path(given)
     if robot.urdf is None:
-        raise InputError(f"{robot.name}: its description names no URDF; add urdf: FILE to it, or give the file")
+        raise InputError(
+            f"{robot.name}: its description names no URDF; add urdf: FILE or mjcf: FILE to it, or give the file"
+        )
     package, colon, _ = str(robot.urdf).partition(":")
     if colon and not robot.urdf.is_file():
         raise InputError(
-            f"{robot.name}: its URDF comes with the Python package {package}, which is not installed: pip install "
+            f"{robot.name}: its file comes with the Python package {package}, which is not installed: pip install "
             f"{package.replace('_', '-')}, or give a URDF of your own"
         )
     return robot.urdf

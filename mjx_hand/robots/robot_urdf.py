@@ -13,8 +13,9 @@ from yourdfpy.urdf import Joint
 
 from mjx_hand.errors import InputError
 from mjx_hand.files.safe_yaml import shown
+from mjx_hand.robots.robot_file import read_robot
 from mjx_hand.robots.solver.kinematic_tree import BASE, HELD, KinematicTree, z_frame
-from mjx_hand.robots.urdf_file import check_joint, limits_of, read_urdf
+from mjx_hand.robots.urdf_file import check_joint, limits_of
 
 _POINT = 1e-3  # rad or m; a range below it is a single position
 _SHOWN = 12  # how many of a robot's links a message names
@@ -37,7 +38,7 @@ def robot_tree(path: str | Path, links: Sequence[str], palm: str | None = None) 
             unknown type or without limits, mimic joints that follow each other or none, limits that exclude each other.
     """
     path = Path(path)
-    robot = read_urdf(path)
+    robot = read_robot(path)
     names = [link.name for link in robot.links]
     if missing := [link for link in (*links, palm) if link is not None and link not in names]:
         listed = ", ".join(str(name)[:40] for name in names[:_SHOWN]) + (", …" if len(names) > _SHOWN else "")

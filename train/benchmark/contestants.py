@@ -88,7 +88,8 @@ def make_script(env: TrackingEnv, worlds: int) -> Script:
         action = rng.uniform(-1, 1, residual.shape)
         smoothing = env.task.smoothing
         residual = (
-            smoothing * residual + (1 - smoothing) * np.asarray(residual_scale(env.task, env.body.names)) * action
+            smoothing * residual
+            + (1 - smoothing) * np.asarray(residual_scale(env.task, env.body.names, env.body.reach)) * action
         )
         target = np.asarray(env.reference.controls)[variant, frame + k] + residual
         controls.append(np.clip(target, *env.engine.models[0].actuator_ctrlrange.T))

@@ -13,8 +13,11 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
+from envs.demonstrations.on_robot.closure import closes
 from envs.demonstrations.on_robot.follow import solve
-from envs.demonstrations.on_robot.pads import Pads, demonstrated_pads
+from envs.demonstrations.on_robot.left_out import NO_CLOSURE, OUT_OF_REACH, LeftOut, shared_pads
+from envs.demonstrations.on_robot.pads import demonstrated_pads
+from envs.demonstrations.on_robot.sticking import followed_places
 from envs.model_grip import Touch
 from envs.scene import NUM_WRIST, base_rotation, demonstration_spec, wrist_coordinates
 from mjx_hand.bodies.body import Body
@@ -36,6 +39,9 @@ _BENT = (0.15, 0.3, 0.45, 0.6)  # of the joints' ranges, at which a search for a
 _DEPTH = 0.002  # m that a link may be inside the object
 _OFF = 0.004  # m that a finger may be off the surface where it should touch
 _CLEAR = 0.001  # m, beyond which another link is not inside
+_SAME_FACE = 0.8  # cosine between the person's way into the object and the robot's
+_ALONG_WRAP, _AROUND = 0.02, 0.01  # m that weigh 1 of a hand that wraps: along the surface, and of further links off it
+_TOUCHES = 0.002  # m off the surface at which a link bears
 _STEPS, _FEW = 60, 6
 _ANYWHERE = 0.3  # m: no link of a hand at an object is farther
 
@@ -63,7 +69,8 @@ def on_robot(demonstration: Demonstration, person: RigidHand, body: Body) -> Bro
     """Bring a person's demonstration onto a robot hand.
 
     Raises:
-        InputError: a hand of the other side; fewer than two of the fingers that touch; or no posture in which they do.
+        InputError: a hand of the other side.
+        LeftOut: fewer than two of the fingers that touch, or no posture in which they do and hold the object.
     """
     if body.side != demonstration.motion.side:
         raise InputError(
@@ -99,12 +106,12 @@ class _Bringing:
 
     def __init__(self, demonstration: Demonstration, person: RigidHand, body: Body):
         self.demonstration, self.body = demonstration, body
-        self.pads = _shared(demonstrated_pads(demonstration, person), body)
+        self.pads = shared_pads(demonstrated_pads(demonstration, person), body)
         self.base = base_rotation(demonstration)
         motion = demonstration.motion
         self.wrist = wrist_coordinates(motion.wrist_position, motion.wrist_quaternion, self.base)
         self.model = demonstration_spec(demonstration, body).compile()
-        self.touch = Touch(self.model, body)
+        self.touch = Touch(self.model, body, palm=True)
         self.count = body.num_targets
         self.mix = coordinates_per_target(self.model, self.count)
         self.low, self.high = self.model.actuator_ctrlrange[: self.count].T
@@ -114,13 +121,21 @@ class _Bringing:
 
     def brought(self) -> Brought:
         targets, off, depth, gap = self._grasp()
-        fingers = self.pads.fingers
-        if off.max() > 2 * _ALONG + _OFF or gap.max() > _OFF or depth > 2 * _DEPTH:
-            worst = fingers[int(off.argmax())]
-            raise InputError(
-                f"{self.body.name!r} cannot grasp as demonstrated ({self.demonstration.grasp}): its {worst} stays "
-                f"{1e3 * off.max():.0f} mm from where the person's touches, its links are {1e3 * depth:.0f} mm inside"
+        fingers, name = (
+            self.pads.fingers,
+            f"{self.body.name!r} cannot grasp as demonstrated ({self.demonstration.grasp})",
+        )
+        far = not self.pads.wraps and (off.max() > 2 * _ALONG + _OFF or gap.max() > _OFF)
+        if far or depth > 2 * _DEPTH:
+            raise LeftOut(
+                OUT_OF_REACH,
+                f"{name}: its {fingers[int(off.argmax())]} stays {1e3 * off.max():.0f} mm from where the person's "
+                f"touches, its links are {1e3 * depth:.0f} mm inside",
             )
+        contacts = [(point, way) for gap, point, way in self._near().values() if gap < _TOUCHES]
+        points, ways = (np.array([contact[k] for contact in contacts]).reshape(-1, 3) for k in (0, 1))
+        if not closes(points, ways, self.demonstration.object.friction):
+            raise LeftOut(NO_CLOSURE, f"{name}: no posture of it has force closure, {len(points)} of its links touch")
         rows = self._follow(targets)
         turn = Rotation.from_matrix(self.base) * Rotation.from_euler("XYZ", rows[:, 3:NUM_WRIST])
         quaternion = turn.as_quat(scalar_first=True)
@@ -140,9 +155,14 @@ class _Bringing:
     def _grasp(self) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
         """The best grasp from several beginnings: targets, and how far they are from what is wanted."""
         frame, pads = self.pads.grasp, self.pads
-        places = pads.places[frame]
+        places = pads.surface
         wrist = self.wrist[frame]
         wanted = [self.last[finger] for finger in pads.fingers]
+        along = _ALONG_WRAP if pads.wraps else _ALONG
+        closing = [
+            k for k, finger in enumerate(self.touch.fingers) if finger in ("", *pads.fingers) and k not in wanted
+        ]
+        closing = closing if pads.wraps else []
 
         def equations(targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             self._place(targets, frame)
@@ -150,14 +170,22 @@ class _Bringing:
             rows, values = [], []
             for link, place, inward in zip(wanted, places, pads.inward, strict=True):
                 gap, point, way = near[link]
+                if (
+                    not pads.wraps and way @ inward < _SAME_FACE
+                ):  # as around a corner: what would touch, were it on this face
+                    point, way = self.touch.foremost(link, inward), inward
+                    gap = float(inward @ (place - point))
                 jacobian = self._jacobian(link, point)
                 aside = np.eye(3) - np.outer(inward, inward)
-                rows += [-(way @ jacobian)[None] / _ON, aside @ jacobian / _ALONG]
-                values += [np.array([gap / _ON]), aside @ (point - place) / _ALONG]
+                rows += [-(way @ jacobian)[None] / _ON, aside @ jacobian / along]
+                values += [np.array([gap / _ON]), aside @ (point - place) / along]
             for link, (gap, point, way) in near.items():
                 if link not in wanted and gap < _CLEAR:
                     rows.append((way @ self._jacobian(link, point))[None] / _INSIDE)
                     values.append(np.array([(_CLEAR - gap) / _INSIDE]))
+                elif link in closing:  # phalanges and the palm of a hand that wraps
+                    rows.append(-(way @ self._jacobian(link, point))[None] / _AROUND)
+                    values.append(np.array([(gap - _CLEAR) / _AROUND]))
             for finger, site in self.sites.items():
                 if finger not in pads.fingers and finger in pads.tips:
                     link = self.last[finger]
@@ -196,7 +224,7 @@ class _Bringing:
         near = self._near()
         wanted = [self.last[finger] for finger in pads.fingers]
         held = [self.touch.on_link(k, near[k][1]) for k in wanted]
-        offset = np.array([near[k][1] for k in wanted]) - pads.places[frame]  # what the grasp could not do
+        ways = followed_places(pads, np.array([near[k][1] for k in wanted]), self.demonstration)
         wrist = self._carried(grasp[:NUM_WRIST])
         unit = np.eye(self.count)
         weights = np.concatenate([np.full(3, _WRIST_WAY), np.full(3, _WRIST_TURN)])
@@ -208,7 +236,7 @@ class _Bringing:
                 for k, link in enumerate(wanted):
                     point = self.touch.in_world(link, held[k])
                     rows.append(self._jacobian(link, point) / _PAD)
-                    values.append((point - pads.places[at, k] - offset[k]) / _PAD)
+                    values.append((point - ways[at, k]) / _PAD)
                 rows += [unit[:NUM_WRIST] / weights[:, None], unit[NUM_WRIST:] / _CHANGE]
                 values += [(targets[:NUM_WRIST] - wrist[at]) / weights, (targets - before)[NUM_WRIST:] / _CHANGE]
                 return np.concatenate(values), np.concatenate(rows)
@@ -235,21 +263,3 @@ class _Bringing:
         turns = np.unwrap((person * (held * robot)).as_euler("XYZ"), axis=0)
         turns += 2 * np.pi * np.round((grasp[3:] - turns[self.pads.grasp]) / (2 * np.pi))
         return np.concatenate([self.wrist[:, :3] + person.apply(place), turns], axis=1)
-
-
-def _shared(pads: Pads, body: Body) -> Pads:
-    """The pads of fingers that the robot has.
-
-    Raises:
-        InputError: fewer than two, or no thumb where the person's touches.
-    """
-    kept = [k for k, finger in enumerate(pads.fingers) if finger in body.fingers]
-    fingers = tuple(pads.fingers[k] for k in kept)
-    opposing = [finger for finger in fingers if finger in body.opposing]
-    if len(fingers) < 2 or not opposing or len(opposing) == len(fingers):
-        touching = ", ".join(pads.fingers) or "none"
-        raise InputError(
-            f"{body.name!r} has {', '.join(body.fingers)}; of the fingers that touch ({touching}) it needs a thumb and "
-            "another one"
-        )
-    return dataclasses.replace(pads, fingers=fingers, places=pads.places[:, kept], inward=pads.inward[kept])

@@ -1,9 +1,11 @@
 """Where a person's fingers touch the object: places on the hand, followed through a demonstration."""
 
 import dataclasses
+from collections import Counter
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
+from scipy.ndimage import binary_closing
 
 from envs.model_grip import NEAR, Touch
 from envs.reference import demonstrated_targets
@@ -13,6 +15,8 @@ from mjx_hand.bodies.human_body import human_body
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.rigid.rigid_hand import RigidHand
 
+_FLICKER = 0.2  # s, in which a finger that touches does not come off and back
+
 
 @dataclasses.dataclass(frozen=True)
 class Pads:
@@ -21,16 +25,22 @@ class Pads:
     Attributes:
         fingers: those that touch the object at `grasp`, which is the frame with most of them.
         places: of each one's pad, the point of its last touching link that is nearest to the object then.
+        surface: the point of the object that is nearest to each pad, at `grasp`.
         inward: unit way from each pad into the object, at `grasp`.
+        touching: whether each of these fingers touches; gaps of less than 0.2 s, as recordings have them, are filled.
         tips: of all five fingers, by name.
         grasp: the frame.
+        wraps: whether more than pads touch then: the palm, or further phalanges of two fingers.
     """
 
     fingers: tuple[str, ...]
     places: Float[np.ndarray, "t f 3"]
+    surface: Float[np.ndarray, "f 3"]
     inward: Float[np.ndarray, "f 3"]
+    touching: Bool[np.ndarray, "t f"]
     tips: dict[str, np.ndarray]
     grasp: int
+    wraps: bool
 
 
 def demonstrated_pads(demonstration: Demonstration, person: RigidHand) -> Pads:
@@ -40,24 +50,30 @@ def demonstrated_pads(demonstration: Demonstration, person: RigidHand) -> Pads:
     """
     body = human_body(person)
     model = demonstration_spec(demonstration, body).compile()
-    touch = Touch(model, body)
+    touch = Touch(model, body, palm=True)
     coordinates = hand_coordinates(model, demonstrated_targets(demonstration))
-    found: dict[int, dict[str, tuple[int, np.ndarray, np.ndarray]]] = {}
+    found: dict[int, dict[str, tuple[int, float, np.ndarray, np.ndarray]]] = {}
     height = demonstration.object_pose[:, 2]
     for frame in range(demonstration.num_frames):
         touch.place(coordinates[frame], demonstration.object_pose[frame])
-        near = {touch.fingers[k]: (k, point, way) for k, _, point, way in touch.nearest(NEAR)}  # the last link wins
+        near = {touch.fingers[k]: (k, gap, point, way) for k, gap, point, way in touch.nearest(NEAR)}
+        near.pop("", None)
         if near:
-            found[frame] = near
+            found[frame] = near  # each finger's last link, which comes last
     lifted = [frame for frame in found if height[frame] - height[0] > 0.3 * np.ptp(height)] or list(found)
     if not lifted:
-        return Pads((), np.zeros((demonstration.num_frames, 0, 3)), np.zeros((0, 3)), {}, 0)
+        frames = demonstration.num_frames
+        nowhere, never = np.zeros((0, 3)), np.zeros((frames, 0), bool)
+        return Pads((), np.zeros((frames, 0, 3)), nowhere, nowhere, never, {}, 0, False)
     most = max(len(found[frame]) for frame in lifted)
     grasp = max(frame for frame in lifted if len(found[frame]) == most)
     fingers = tuple(sorted(found[grasp], key=lambda name: (name != "thumb", body.fingers.index(name))))
     touch.place(coordinates[grasp], demonstration.object_pose[grasp])
     held = [found[grasp][finger] for finger in fingers]
-    on_links = [(number, touch.on_link(number, point)) for number, point, _ in held]
+    touching_links = Counter(touch.fingers[k] for k, *_ in touch.nearest(NEAR))
+    wraps = "" in touching_links or sum(count > 1 for count in touching_links.values()) > 1
+    on_links = [(number, touch.on_link(number, point)) for number, _, point, _ in held]
+    surface = np.stack([point + gap * way for _, gap, point, way in held])
     places = np.empty((demonstration.num_frames, len(fingers), 3))
     sites = {finger: model.site(f"{finger}_tip").id for finger in body.fingers}
     tips = {finger: np.empty((demonstration.num_frames, 3)) for finger in body.fingers}
@@ -67,4 +83,8 @@ def demonstrated_pads(demonstration: Demonstration, person: RigidHand) -> Pads:
             places[frame, k] = touch.in_world(number, place)
         for finger, site in sites.items():
             tips[finger][frame] = touch.data.site_xpos[site]
-    return Pads(fingers, places, np.stack([way for *_, way in held]), tips, grasp)
+    near = np.array([[finger in found.get(frame, ()) for finger in fingers] for frame in range(len(places))])
+    filled = np.ones((round(_FLICKER * demonstration.motion.fps), 1), bool)
+    touching = binary_closing(np.pad(near, ((len(filled), len(filled)), (0, 0)), mode="edge"), filled)
+    touching = touching[len(filled) : -len(filled)]
+    return Pads(fingers, places, surface, np.stack([way for *_, way in held]), touching, tips, grasp, wraps)

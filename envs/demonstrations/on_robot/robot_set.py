@@ -2,10 +2,12 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from envs.demonstrations.on_robot.bring import moved_by, on_robot
+from envs.demonstrations.on_robot.left_out import LeftOut
 from mjx_hand.bodies.body import Body
 from mjx_hand.bodies.body_places import body_model
 from mjx_hand.errors import InputError
@@ -17,10 +19,21 @@ from mjx_hand.rigid.rigid_hand import RigidHand
 _MOTION = ("angles", "wrist_position", "wrist_quaternion")
 
 
-def robot_demonstrations(
-    demonstrations: Sequence[Demonstration], people: Sequence[RigidHand], body: Body
-) -> list[Demonstration]:
-    """The demonstrations on a robot hand; those that it cannot do are left out, and said with the reason.
+@dataclass(frozen=True)
+class RobotSet:
+    """What of a set a robot can do.
+
+    Attributes:
+        done: the demonstrations on the robot, by their numbers in the set.
+        left_out: why it cannot do the others, by theirs.
+    """
+
+    done: dict[int, Demonstration]
+    left_out: dict[int, LeftOut]
+
+
+def robot_set(demonstrations: Sequence[Demonstration], people: Sequence[RigidHand], body: Body) -> RobotSet:
+    """The demonstrations on a robot hand, and those that it cannot do.
 
     Args:
         demonstrations: of people.
@@ -28,7 +41,7 @@ def robot_demonstrations(
         body: the robot's.
 
     Raises:
-        InputError: it can do none of them.
+        InputError: a hand of the other side.
     """
 
     def compute() -> dict[str, np.ndarray]:
@@ -38,18 +51,34 @@ def robot_demonstrations(
                 try:
                     motion = on_robot(d, person, body).demonstration.motion
                     arrays |= {f"{name}.{k}": getattr(motion, name) for name in _MOTION}
-                except InputError as error:
-                    arrays[f"refused.{k}"] = np.array(str(error))
+                except LeftOut as error:
+                    arrays[f"left out.{k}"] = np.array([error.reason, str(error)])
                 advance(1)
         return arrays
 
     arrays = cached(compute, "on a robot", list(demonstrations), body.name, model_bytes(body_model(body)))
-    refused = {k: str(arrays[f"refused.{k}"]) for k in range(len(demonstrations)) if f"refused.{k}" in arrays}
-    for grasp, count in Counter(demonstrations[k].grasp for k in refused).items():
-        first = next(reason for k, reason in refused.items() if demonstrations[k].grasp == grasp)
+    done, left_out = {}, {}
+    for k, d in enumerate(demonstrations):
+        if f"left out.{k}" in arrays:
+            left_out[k] = LeftOut(*(str(text) for text in arrays[f"left out.{k}"]))
+        else:
+            done[k] = moved_by(body, d, *(np.asarray(arrays[f"{name}.{k}"]) for name in _MOTION))
+    return RobotSet(done, left_out)
+
+
+def robot_demonstrations(
+    demonstrations: Sequence[Demonstration], people: Sequence[RigidHand], body: Body
+) -> list[Demonstration]:
+    """The demonstrations on a robot hand; those that it cannot do are left out, and said with the reason.
+
+    Raises:
+        InputError: as `robot_set`, or it can do none of them.
+    """
+    made = robot_set(demonstrations, people, body)
+    for grasp, count in Counter(demonstrations[k].grasp for k in made.left_out).items():
+        first = next(reason for k, reason in made.left_out.items() if demonstrations[k].grasp == grasp)
         of_type = sum(d.grasp == grasp for d in demonstrations)
-        if len(refused) == len(demonstrations):
+        if not made.done:
             raise InputError(f"{body.name} can do none of {len(demonstrations)} demonstrations: {first}")
         print(f"{body.name}: {count} of {of_type} demonstrations of {grasp} left out: {first}", flush=True)
-    kept = [(k, d) for k, d in enumerate(demonstrations) if k not in refused]
-    return [moved_by(body, d, *(np.asarray(arrays[f"{name}.{k}"]) for name in _MOTION)) for k, d in kept]
+    return list(made.done.values())

@@ -16,7 +16,7 @@ from jaxtyping import Float
 from mjx_hand.rigid.gains import Gains
 
 TIP_FORCE = 15.0  # N
-_TRAVEL = (0.5, 0.01)  # rad or m from the target, at which the limit is reached
+_TRAVEL = (0.2, 0.004)  # rad or m from the target, at which the limit is reached
 _LEAST_LEVER = 0.02  # m
 _DAMPING = 0.7  # of the critical
 _HUMAN = (0.5, 0.007)  # kg, and kg m2 about the wrist

@@ -11,9 +11,10 @@ from yourdfpy.urdf import Joint
 
 from mjx_hand.errors import InputError
 from mjx_hand.files.safe_yaml import shown
+from mjx_hand.robots.robot_file import read_robot
 from mjx_hand.robots.robot_hand import RobotHand
 from mjx_hand.robots.robot_urdf import robot_tree
-from mjx_hand.robots.urdf_file import check_joint, limits_of, read_urdf
+from mjx_hand.robots.urdf_file import check_joint, limits_of
 
 _REACH = (0.03, 0.6)  # m from the palm to a finger tip
 _MOST_OTHERS = 2  # fingers that a description may leave out
@@ -77,7 +78,7 @@ def hand_links(description: RobotHand, path: str | Path) -> HandLinks:
             hand has; fingers of a second hand.
     """
     path = Path(path)
-    robot = read_urdf(path)
+    robot = read_robot(path)
     above = _tree(path, robot)
     tree = robot_tree(path, list(description.tips), description.palm)  # refuses links and joints that cannot be
     ranges = dict(zip(tree.dof_names, zip(tree.lower.tolist(), tree.upper.tolist(), strict=True), strict=True))

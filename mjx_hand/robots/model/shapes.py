@@ -12,6 +12,7 @@ from scipy.spatial import KDTree
 
 from mjx_hand.errors import InputError
 from mjx_hand.files.safe_yaml import shown
+from mjx_hand.robots.mjcf_file import ReadMesh
 
 COLLISIONS = ("hulls", "capsules")
 _THICK, _SHORT = 0.008, 0.006  # m: the radius of a capsule along a bone, and a bone that needs none
@@ -48,7 +49,7 @@ def shapes_of(path: Path, link: str, given: Sequence[Any]) -> tuple[Shape, ...]:
 def is_there(path: Path, given: Any) -> bool:
     """Whether a `<visual>` or `<collision>` element is of a shape whose file, if it needs one, is there."""
     mesh = None if given.geometry is None else given.geometry.mesh
-    return mesh is None or mesh_file(path, mesh.filename) is not None
+    return mesh is None or isinstance(mesh, ReadMesh) or mesh_file(path, mesh.filename) is not None
 
 
 def hull(shape: Shape) -> Shape:
@@ -148,6 +149,8 @@ def _shape(path: Path, link: str, given: Any) -> Shape:
     elif geometry.sphere is not None:
         (radius,) = _sizes(path, link, [geometry.sphere.radius])
         made, kind, size = trimesh.creation.icosphere(3, radius), "sphere", (float(radius),)
+    elif isinstance(geometry.mesh, ReadMesh):
+        made, kind, size = geometry.mesh.surface, geometry.mesh.kind, geometry.mesh.size
     elif geometry.mesh is not None:
         made, kind, size = _mesh(path, link, geometry.mesh), "mesh", ()
     else:

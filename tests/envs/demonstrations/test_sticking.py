@@ -1,0 +1,30 @@
+"""Pads go with the object while the person's finger touches, whatever the recording's own slip, and with it before."""
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from envs.demonstrations.on_robot.pads import Pads
+from envs.demonstrations.on_robot.sticking import followed_places
+from mjx_hand.pytree import replace
+
+FIRST, LAST, GRASP = 40, 90, 60
+
+
+def test_a_pad_sticks_while_the_finger_touches_and_follows_it_else(demonstrations):
+    d = demonstrations[0]
+    t = np.arange(120)
+    turn = Rotation.from_rotvec(np.outer(t, [0.0, 0.004, 0.01]))
+    position = np.stack([0.002 * t, np.zeros(120), 0.001 * t], axis=1)
+    d = replace(d, object_pose=np.concatenate([position, turn.as_quat(scalar_first=True)], axis=1))
+    own = np.stack([0.02 + 0.001 * np.sin(t / 5), np.maximum(FIRST - t, 0) * 0.001, 0.0 * t], axis=1)  # slips, comes
+    places = (position + turn.apply(own))[:, None]
+    touching = ((t >= FIRST) & (t < LAST))[:, None]
+    pads = Pads(("thumb",), places, np.zeros((1, 3)), np.zeros((1, 3)), touching, {}, GRASP, False)
+    off = np.array([0.001, 0.002, -0.003])
+    grasp = position[GRASP] + turn[GRASP].apply(own[GRASP] + off)
+    seen = turn.inv().apply(followed_places(pads, grasp[None], d)[:, 0] - position)
+    well_inside = slice(FIRST + 6, LAST - 6)  # 0.1 s from its ends, at 50 frames a second
+    np.testing.assert_allclose(seen[well_inside], np.tile(own[GRASP] + off, (LAST - FIRST - 12, 1)), atol=1e-9)
+    outside = np.r_[0:FIRST, LAST:120]
+    np.testing.assert_allclose(seen[outside], own[outside] + off, atol=1e-9)
+    assert np.abs(np.diff(seen, axis=0)).max() < 0.0015  # no jolt: 1 mm a frame is the finger's own

@@ -1,0 +1,120 @@
+"""Which demonstrations robot hands can do: `python -m train.robots hands=[allegro,fourier.yaml] config=all`.
+
+A table of robots x grasp types: how many of a part's demonstrations are brought onto the hand, and for what reason the
+others are left out: no finger for it, a place out of reach, no force closure. Options besides `hands` and `first=N`,
+which takes the first N of each type, are those of `train.evaluate`. Writes `robots.json` with every message to `out`.
+"""
+
+import json
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from envs.demonstrations.load_set import load_demonstrations
+from envs.demonstrations.on_robot.left_out import REASONS
+from envs.demonstrations.on_robot.robot_set import robot_set
+from envs.demonstrations.twin_hands import twins
+from mjx_hand.bodies.robot_body import robot_body
+from mjx_hand.compile_cache import enable_compile_cache
+from mjx_hand.errors import InputError
+from mjx_hand.files.npz_archive import replacing
+from mjx_hand.motion.demonstration import Demonstration
+from mjx_hand.view.report import Table
+from train.evaluate import show
+from train.settings.config import Config, compose
+
+NAME = "robots"
+
+
+@dataclass(frozen=True)
+class Possible:
+    """What of one type's demonstrations one robot can do.
+
+    Attributes:
+        hand: the robot's name.
+        grasp: the type.
+        total: how many there are.
+        left_out: kind of reason and message, by the demonstration's number among these.
+    """
+
+    hand: str
+    grasp: str
+    total: int
+    left_out: dict[int, tuple[str, str]]
+
+    def told(self) -> str:
+        """As in "29 of 32; out of reach 3"."""
+        reasons = Counter(reason for reason, _ in self.left_out.values())
+        said = [f"{reason} {reasons[reason]}" for reason in REASONS if reasons[reason]]
+        return "; ".join([f"{self.total - len(self.left_out)} of {self.total}", *said])
+
+
+def possible(hand: str, demonstrations: Sequence[Demonstration]) -> list[Possible]:
+    """What a robot can do of people's demonstrations, type by type.
+
+    Raises:
+        InputError: as `robot_body`, or a hand of the other side.
+    """
+    body = robot_body(hand)
+    found = []
+    for grasp in dict.fromkeys(d.grasp for d in demonstrations):
+        of_type = [d for d in demonstrations if d.grasp == grasp]
+        made = robot_set(of_type, twins(of_type), body)
+        told = {k: (error.reason, str(error)) for k, error in made.left_out.items()}
+        found.append(Possible(body.name, grasp, len(of_type), told))
+    return found
+
+
+def table(rows: Sequence[Possible], part: str) -> Table:
+    """A row a robot, a column a type."""
+    grasps = list(dict.fromkeys(row.grasp for row in rows))
+    cells = {(row.hand, row.grasp): row.told() for row in rows}
+    hands = dict.fromkeys(row.hand for row in rows)
+    return Table(
+        columns=("hand", *grasps),
+        rows=tuple((hand, *(cells[hand, grasp] for grasp in grasps)) for hand in hands),
+        note=f"{part} demonstrations that each hand can do, and why not the others",
+    )
+
+
+def run(hands: Sequence[str], first: int | None, config: Config) -> Path:
+    """Bring every demonstration onto every hand, print the table, and write all to the `out` folder."""
+    demonstrations: list[Demonstration] = []
+    for single in config.data.expand_types():
+        demonstrations += load_demonstrations(single, config.part, config.demonstrations)[:first]
+    rows = [row for hand in hands for row in possible(hand, demonstrations)]
+    show(table(rows, config.part))
+    told = [
+        {"hand": r.hand, "grasp": r.grasp, "of": r.total, "done": r.total - len(r.left_out), "left out": r.left_out}
+        for r in rows
+    ]
+    out = Path(config.out)
+    out.mkdir(parents=True, exist_ok=True)
+    with replacing(out / f"{NAME}.json") as file:
+        file.write_text(json.dumps(told, indent=1))
+    return out / f"{NAME}.json"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The command; its exit status: 0, or 2 for input that cannot be used."""
+    argv = sys.argv[1:] if argv is None else argv
+    own = dict(argument.partition("=")[::2] for argument in argv if argument.partition("=")[0] in ("hands", "first"))
+    try:
+        hands = [name.strip(" '\"") for name in own.get("hands", "allegro").strip("[]").split(",")]
+        first = own.get("first", "")
+        if not all(hands) or (first and not (first.isdigit() and int(first) > 0)):
+            raise InputError(f"hands={own.get('hands')} first={first}: give as in hands=[allegro,shadow] first=8")
+        config = compose([argument for argument in argv if argument.partition("=")[0] not in own])
+        enable_compile_cache()
+        written = run(list(dict.fromkeys(hands)), int(first) if first else None, config)
+    except (InputError, OSError) as error:
+        print(f"{NAME}: {InputError(error) if isinstance(error, OSError) else error}", file=sys.stderr)
+        return 2
+    print(f"written: {written.resolve()}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
