@@ -93,11 +93,10 @@ class _Reading:
 
     def _end(self, body: int) -> Float[np.ndarray, "3"] | None:
         """The point of a body's shapes that is farthest from its joint (m, its link's frame)."""
-        link = self._link(body)
-        corners = [
-            _corners(shape.geometry) @ shape.origin[:3, :3].T + shape.origin[:3, 3]
-            for shape in (link.collisions or link.visuals)
-        ]
+        link, corners = self._link(body), []
+        for shape in link.collisions or link.visuals:
+            place = np.asarray(shape.origin)
+            corners.append(_corners(shape.geometry) @ place[:3, :3].T + place[:3, 3])
         if not corners:
             return None
         points = np.concatenate(corners)
@@ -119,22 +118,19 @@ class _Reading:
         own = [k for k in range(first, first + model.body_jntnum[body]) if model.jnt_type[k] != _FREE]
         if not own:
             return Joint(f"{name} on {parent}", "fixed", parent, name, place)
-        for joint in own:
-            if model.jnt_type[joint] not in (_HINGE, _SLIDE):
-                raise InputError(f"{self.path}: {shown(self.joints[joint])} is a ball joint; valid: hinge, slide")
-            anchor = model.jnt_pos[joint]
-            made = self._joint(joint, parent, f"{name} {self.joints[joint]}", place @ _place(anchor))
-            if joint == own[-1]:
-                break
+        for joint in own[:-1]:
+            made = self._joint(joint, parent, f"{name} {self.joints[joint]}", place @ _place(model.jnt_pos[joint]))
             joints.append(made)
             links.append(Link(made.child))
-            parent, place = made.child, _place(-anchor)
-        made.child, self.origins[body] = name, anchor
-        return made
+            parent, place = made.child, _place(-model.jnt_pos[joint])
+        self.origins[body] = model.jnt_pos[own[-1]]
+        return self._joint(own[-1], parent, name, place @ _place(self.origins[body]))
 
     def _joint(self, joint: int, parent: str, child: str, place: Float[np.ndarray, "4 4"]) -> Joint:
         model, name = self.model, self.joints[joint]
         slides, limited = model.jnt_type[joint] == _SLIDE, bool(model.jnt_limited[joint])
+        if model.jnt_type[joint] not in (_HINGE, _SLIDE):
+            raise InputError(f"{self.path}: {shown(name)} is a ball joint; valid: hinge, slide")
         if slides and not limited:
             raise InputError(f"{self.path}: joint {shown(name)} slides without a range; add range=...")
         low, high = model.jnt_range[joint] - model.qpos0[model.jnt_qposadr[joint]]
@@ -220,15 +216,20 @@ class _Reading:
         return found
 
 
-def _corners(geometry: Geometry) -> Float[np.ndarray, "n 3"]:
+def _corners(geometry: Geometry | None) -> Float[np.ndarray, "n 3"]:
     """Corners of a shape's surface (m, its frame)."""
-    if geometry.mesh is not None:
-        return np.asarray(geometry.mesh.surface.vertices, float)
-    if geometry.box is not None:
-        return np.asarray(trimesh.creation.box(geometry.box.size).vertices, float)
-    if geometry.cylinder is not None:
-        return np.asarray(trimesh.creation.cylinder(geometry.cylinder.radius, geometry.cylinder.length).vertices, float)
-    return np.asarray(trimesh.creation.icosphere(3, geometry.sphere.radius).vertices, float)
+    if geometry is None:
+        return np.zeros((0, 3))
+    if isinstance(geometry.mesh, ReadMesh):
+        made = geometry.mesh.surface
+    elif geometry.box is not None:
+        made = trimesh.creation.box(geometry.box.size)
+    elif geometry.cylinder is not None:
+        made = trimesh.creation.cylinder(geometry.cylinder.radius, geometry.cylinder.length)
+    else:
+        assert geometry.sphere is not None
+        made = trimesh.creation.icosphere(3, geometry.sphere.radius)
+    return np.asarray(made.vertices, float)
 
 
 def _place(position: Float[np.ndarray, "3"], quaternion: Float[np.ndarray, "4"] | None = None) -> np.ndarray:

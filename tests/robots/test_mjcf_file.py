@@ -101,7 +101,7 @@ def test_a_joints_zero_is_where_the_file_is_drawn(tmp_path):
     assert joint.limit is not None
     np.testing.assert_allclose([joint.limit.lower, joint.limit.upper], [-0.2, 0.8])
     (tip,) = (each for each in robot.joints if each.child == "a_tip")  # the corner that is farthest from the joint
-    np.testing.assert_allclose(np.abs(tip.origin[:3, 3]), [0.01, 0.02, 0.06])
+    np.testing.assert_allclose(np.abs(np.asarray(tip.origin)[:3, 3]), [0.01, 0.02, 0.06])
 
 
 @pytest.mark.parametrize(
