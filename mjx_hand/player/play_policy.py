@@ -157,7 +157,7 @@ class Player:
             grip=reference.grip[frame],
             pose=reference.object_pose[frame],
             first_pose=reference.object_pose[0],
-            targets_ahead=reference.targets[later] + np.stack([self._followed(k) for k in later]),
+            targets_ahead=reference.targets[later] + np.stack([self._followed(int(k)) for k in later]),
             poses_ahead=reference.object_pose[later],
             phase=np.array([frame / reference.num_frames]),
             object_features=reference.object_features,
