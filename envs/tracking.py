@@ -168,7 +168,7 @@ class TrackingEnv(Env):
         physics, episode = jax.tree.map(lambda table: table[demonstration, frame], self.tables.starts), None
         if (tables := self.tables.disturbances) is not None:
             key = jax.random.fold_in(jax.random.key(0), demonstration) if rng is None else rng
-            told = tables, self.reference, self.task.follow_object
+            told = tables, self.reference.controls, self.reference.object_pose, self.task.follow_object
             frame, physics, episode = disturbed_start(*told, demonstration, frame, physics, key)
         twin = Twin(
             physics=physics,

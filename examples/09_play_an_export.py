@@ -58,7 +58,7 @@ def see(model, data, reference: dict, lookahead: np.ndarray, frame: int, residua
         targets[later] - targets[frame],
         (poses[later, :3] - pose[:3]) @ base,
         [frame / len(targets), place[2] - poses[0, 2]],
-        reference["object_features"],
+        np.delete(reference["object_features"], [3, 4]),  # mass and friction, which policies do not see
     )
     return np.concatenate([np.ravel(part) for part in parts])
 

@@ -12,7 +12,6 @@ from envs.disturbances.episode import Episode, EpisodeTables, draw_episode, epis
 from envs.disturbances.randomize import Randomize
 from envs.disturbances.variation import Variation, varied_pose
 from envs.physics.engine import PhysicsState
-from envs.reference import Reference
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.player.approach import displacement
 from mjx_hand.pytree import pytree
@@ -67,7 +66,8 @@ def disturbance_tables(
 
 def disturbed_start(
     tables: DisturbanceTables,
-    reference: Reference,
+    controls: Float[Array, "d t u"],
+    object_pose: Float[Array, "d t 7"],
     follow: bool,
     demonstration: Int[Array, ""],
     frame: Int[Array, ""],
@@ -78,22 +78,22 @@ def disturbed_start(
 
     Args:
         tables: what is drawn from.
-        reference: the demonstrations.
+        controls, object_pose: of the demonstrations (m, rad, wxyz).
         follow: whether the wrist's path goes with the object.
         demonstration, frame: what is asked for.
         physics: the undisturbed state there.
         key: of the draws.
     """
     which, others = jax.random.split(key)
-    each = tables.elsewhere.shape[0] // reference.controls.shape[0]
+    each = tables.elsewhere.shape[0] // controls.shape[0]
     variation = demonstration * each + jax.random.randint(which, (), 0, each)
     frame = jnp.where(tables.elsewhere[variation], 0, frame)
     first = jax.tree.map(lambda table: table[variation], tables.first)
     later = dataclasses.replace(physics, variant=variation)
     physics = jax.tree.map(lambda a, b: jnp.where(frame == 0, a, b), first, later)
-    episode = draw_episode(tables.episode, demonstration, reference.controls[demonstration, frame], others)
+    episode = draw_episode(tables.episode, demonstration, controls[demonstration, frame], others)
     if follow:
         seen = seen_pose(episode, tables.episode, jnp.zeros_like(frame), first.qpos[-_FREE:])
-        moved = displacement(seen, reference.object_pose[demonstration, 0], jnp)
+        moved = displacement(seen, object_pose[demonstration, 0], jnp)
         episode = dataclasses.replace(episode, displacement=moved)
     return frame, physics, episode
