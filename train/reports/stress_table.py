@@ -36,8 +36,8 @@ def stress_table(stress: Stress) -> Table:
     note = (
         f"%; {count} {PART_WORDS[stress.part]}, {seeds} seed{'s' if seeds > 1 else ''}, every rollout counted, from "
         "frame 0; neither is told of the disturbance. First the share that is never lost (CHORD) and still held, with "
-        "its 95 % interval (Wilson). Constant press: the better in each row of those that searches on the training "
-        f"demonstrations found, as recorded and disturbed as in training: {strengths}"
+        "its 95 % interval (Wilson). Constant press: the best in each row of what searches on the training "
+        f"demonstrations found, {stress.searched}: {strengths}"
     )
     return Table(columns, rows, note)
 

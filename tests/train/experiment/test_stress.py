@@ -76,16 +76,15 @@ def test_intervals_are_wilsons():
         scores = {"chord": chord, "hold": hold, "kept": chord & hold, "manip_trans_object": chord}
         return Evaluation(np.zeros(10, int), scores, ("",) * 10)
 
-    found = Stress(
-        {row: {0: scored(8), 1: scored(8)} for row in FEW}, {row: scored(0) for row in FEW}, {"pinch": "9 N"}, "sealed"
-    )
+    policies, press = {row: {0: scored(8), 1: scored(8)} for row in FEW}, {row: scored(0) for row in FEW}
+    found = Stress(policies, press, {"pinch": "9 N"}, "as recorded", "sealed")
     z, n, share = 1.959964, 20, 0.8  # Wilson 1927, of both seeds' rollouts together
     centre, half = share + z**2 / (2 * n), z * np.sqrt(share * (1 - share) / n + z**2 / (4 * n**2))
     low, high = ((centre + sign * half) / (1 + z**2 / n) for sign in (-1, 1))
     table = stress_table(found)
     assert table.rows[0][1:] == ("80.0 (58 to 92)", "90.0 / 80.0 / 90.0", "0.0 (0 to 28)", "90.0 / 0.0 / 90.0")
     assert (round(100 * low), round(100 * high)) == (58, 92)
-    assert "9 N" in table.note
+    assert "as recorded: pinch 9 N" in table.note
     assert "10 demonstrations of the sealed part" in table.note
     figure = stress_figure(found)
     assert [axes.get_xlabel() for axes in figure.axes] == ["moved (mm)"]
