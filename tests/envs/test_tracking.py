@@ -146,7 +146,7 @@ def test_observations_are_finite_and_bounded_everywhere(env, start):
     assert seen.shape == (400, env.observation_size)
     assert np.isfinite(seen).all()
     assert np.abs(seen).max() <= 5
-    assert (seen.std(axis=0) > 1e-4).mean() > 0.8  # all but residuals, which begin at none, and fingers that idle
+    assert (seen.std(axis=0) > 1e-4).mean() > 0.75  # all but residuals, which begin at none, and fingers that idle
     assert (np.abs(seen) >= 5).mean() < 0.02  # and are not cut off
 
 

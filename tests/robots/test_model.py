@@ -85,7 +85,7 @@ def test_the_rule_of_gains(tmp_path):
     assert limits["thumb_base_joint"] == pytest.approx(0.2)
     assert limits["index_base_joint"] == pytest.approx(0.3)
     assert limits["middle_base_joint"] == pytest.approx(15 * length, rel=1e-6)
-    np.testing.assert_allclose(body.gains.stiffness, body.gains.force_limit / 0.5)
+    np.testing.assert_allclose(body.gains.stiffness, body.gains.force_limit / 0.2)
 
 
 def test_what_an_arm_carries_is_cut_off_and_said(tmp_path):

@@ -18,6 +18,7 @@ def arguments(config: Config, out: Path, **distributed: object) -> list[str]:
             "data.heldout_people=1",
             "data.trials=1",
             "data.heldout_trials=1",
+            "randomize.share=0",
         ),
         f"checks.every={config.checks.every}",
         *(f"ppo.{name}={value}".replace(" ", "") for name, value in values.items()),

@@ -11,6 +11,7 @@ from filelock import FileLock
 import train.ppo
 from envs.demonstrations.dataset import make_set
 from envs.demonstrations.set_settings import SetSettings
+from envs.disturbances import Randomize
 from envs.evaluation.roll_out import make_roll_out
 from envs.parallel import ParallelEnv
 from envs.tracking import TrackingEnv
@@ -42,6 +43,7 @@ def tiny(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureReques
         out=str(tmp_path_factory.mktemp("tiny") / "out"),
         demonstrations=str(shared / "demonstrations"),
         data=SetSettings(grasp="pinch", people=1, heldout_people=1, trials=1, heldout_trials=1),
+        randomize=Randomize(),
         ppo=TINY,
         checks=Checks(every=32),
     )

@@ -21,7 +21,8 @@ def test_a_cell_tells_how_many_are_done_and_why_not_the_others():
 def test_the_command_counts_a_sets_demonstrations(tiny, tmp_path, capsys):
     assert urdf_of("allegro").is_file()  # skips without the package that carries it
     data = tiny.data
-    options = [f"data.people={data.people}", f"data.heldout_people={data.heldout_people}", f"data.trials={data.trials}"]
+    counts = ("people", "trials", "heldout_people", "heldout_trials")
+    options = [f"data.{name}={getattr(data, name)}" for name in counts]
     given = [*options, f"demonstrations={tiny.demonstrations}", f"out={tmp_path}", "first=1", "hands=[allegro]"]
     assert main(["config=pinch", *given]) == 0
     (row,) = json.loads((tmp_path / "robots.json").read_text())
