@@ -60,7 +60,7 @@ def write_grab(name: str, motion: Motion, demonstration: Demonstration, folder: 
     path = folder / "grab" / "simulated" / f"{name}.npz"
     path.parent.mkdir(parents=True, exist_ok=True)
     arrays = {key: np.array(value, dtype=object) for key, value in told.items()}
-    np.savez(path, framerate=motion.fps, obj_name=demonstration.grasp, **arrays)
+    np.savez(path, framerate=motion.fps, obj_name=demonstration.grasp, **arrays)  # type: ignore[arg-type]
     return path
 
 

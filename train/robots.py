@@ -100,7 +100,7 @@ def run(hands: Sequence[str], first: int | None, config: Config) -> Path:
 def main(argv: Sequence[str] | None = None) -> int:
     """The command; its exit status: 0, or 2 for input that cannot be used."""
     argv = sys.argv[1:] if argv is None else argv
-    own = dict(argument.partition("=")[::2] for argument in argv if argument.partition("=")[0] in ("hands", "first"))
+    own = {key: value for key, _, value in (argument.partition("=") for argument in argv) if key in ("hands", "first")}
     try:
         hands = [name.strip(" '\"") for name in own.get("hands", "allegro").strip("[]").split(",")]
         first = own.get("first", "")

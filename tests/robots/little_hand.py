@@ -15,7 +15,9 @@ FOLLOW = 0.7
 LIMIT = 1.6
 LENGTHS = (0.045, 0.03, 0.02)
 DIGITS = ("thumb", "index", "middle", "ring")
-BASES = dict(zip(DIGITS, ([0.01, 0.03, 0.03], [0, 0.03, 0.09], [0, 0, 0.095], [0, -0.03, 0.09]), strict=True))
+BASES: dict[str, list[float]] = dict(
+    zip(DIGITS, ([0.01, 0.03, 0.03], [0, 0.03, 0.09], [0, 0, 0.095], [0, -0.03, 0.09]), strict=True)
+)
 TIPS = [KEYPOINTS.index(f"{digit}_tip") for digit in DIGITS]
 MIRROR = np.array([1.0, -1.0, 1.0])
 

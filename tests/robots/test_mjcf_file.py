@@ -99,7 +99,7 @@ def test_a_joints_zero_is_where_the_file_is_drawn(tmp_path):
     robot = read_mjcf(tmp_path / "r.xml")
     (joint,) = (each for each in robot.joints if each.type != "fixed")
     assert joint.limit is not None
-    np.testing.assert_allclose([joint.limit.lower, joint.limit.upper], [-0.2, 0.8])
+    assert (joint.limit.lower, joint.limit.upper) == pytest.approx((-0.2, 0.8))
     (tip,) = (each for each in robot.joints if each.child == "a_tip")  # the corner that is farthest from the joint
     np.testing.assert_allclose(np.abs(np.asarray(tip.origin)[:3, 3]), [0.01, 0.02, 0.06])
 

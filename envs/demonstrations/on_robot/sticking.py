@@ -48,6 +48,6 @@ def _spells(touching: Bool[np.ndarray, "t"]) -> list[tuple[int, int]]:
 def _onto(touching: Bool[np.ndarray, "t"], fps: float) -> Float[np.ndarray, "t"]:
     """How much a pad goes with the object, from 0 to 1 and back without a jolt; a demonstration's ends are none."""
     ramp = round(_ONTO * fps) + 1
-    inside = distance_transform_edt(np.pad(touching, ramp, mode="edge"))[ramp:-ramp]
-    share = np.clip(np.asarray(inside) / ramp, 0.0, 1.0)
+    inside = np.asarray(distance_transform_edt(np.pad(touching, ramp, mode="edge")))[ramp:-ramp]
+    share = np.clip(inside / ramp, 0.0, 1.0)
     return share**2 * (3 - 2 * share)

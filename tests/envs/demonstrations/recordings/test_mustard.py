@@ -61,6 +61,6 @@ def away_from_recorded(d: Demonstration, first: int) -> float:
     frames = first + np.arange(d.num_frames) * recorded.fps / d.motion.fps
     there = np.stack([np.interp(frames, np.arange(len(c)), c) for c in recorded.wrist_position.T], axis=1)
     made = d.motion.wrist_position
-    turn, _ = Rotation.align_vectors(made - made.mean(axis=0), there - there.mean(axis=0))
+    turn = Rotation.align_vectors(made - made.mean(axis=0), there - there.mean(axis=0))[0]
     laid = turn.apply(there - there.mean(axis=0)) + made.mean(axis=0)
     return float(np.linalg.norm(laid - made, axis=1).mean())
