@@ -38,7 +38,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
     Larger pieces of work come first: single files are left to even out what the workers take.
     """
-    if config.getvalue("dist") != "loadfile" or len(config.getvalue("tx")) != 2:
+    if config.getvalue("dist") != "loadfile" or len(config.getvalue("tx") or ()) != 2:
         return None
     from xdist.scheduler import LoadFileScheduling
 

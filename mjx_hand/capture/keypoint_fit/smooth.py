@@ -11,7 +11,7 @@ Array = np.ndarray
 
 def fill_short_gaps(positions: Float[Array, "t 21 3"], frames: int) -> Float[Array, "t 21 3"]:
     """Straight lines across a keypoint's gaps of at most `frames` frames; longer ones and the ends stay NaN."""
-    filled, seen = positions.copy(), np.isfinite(positions).all(axis=2)
+    filled, seen = positions.copy(), np.asarray(np.isfinite(positions).all(axis=2))
     short = short_gaps(seen, frames)
     for k in np.flatnonzero(seen.any(axis=0)):
         lines = fill_lines(np.where(seen[:, k, None], positions[:, k], 0.0), seen[:, k])
