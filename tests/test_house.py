@@ -30,7 +30,14 @@ FLOORS = (
     ("mjx_hand.player",),
     ("mjx_hand.hand.joints",),  # the order of all arrays
     ("mjx_hand.files",),
-    ("mjx_hand.rotations", "mjx_hand.pytree", "mjx_hand.compile_cache", "mjx_hand.progress", "mjx_hand.plugins"),
+    (
+        "mjx_hand.rotations",
+        "mjx_hand.pytree",
+        "mjx_hand.compile_cache",
+        "mjx_hand.progress",
+        "mjx_hand.plugins",
+        "mjx_hand.smoothstep",
+    ),
     ("mjx_hand.errors", "mjx_hand.lazy_exports"),
 )
 # Re-export the public names, so they open on every room of their package and no module goes through them.

@@ -9,6 +9,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from mjx_hand.bodies.body import Body
+from mjx_hand.bodies.body_places import body_model, model_places
+from mjx_hand.bodies.coordinates import hand_coordinates
 from mjx_hand.capture.keypoints.layouts import KEYPOINTS
 
 FOLLOW = 0.7
@@ -44,6 +47,22 @@ def keypoints_of(values: np.ndarray) -> np.ndarray:
             place = place + LENGTHS[k] * Rotation.from_rotvec(angle[:, None] * axis).apply(along)
             points[:, first + 1 + k] = place
     return points
+
+
+def tips_of(body: Body, base: str, middle: str) -> tuple[np.ndarray, np.ndarray]:
+    """Tips of a body in a few postures, and where its own kinematics have them in the axes of a person's wrist.
+
+    Args:
+        body: built from a file of this hand.
+        base, middle: what its hinges are called, with {} for the digit.
+    """
+    values = postures(5)
+    places = {name.format(d): values[:, k, j] for k, d in enumerate(DIGITS) for j, name in enumerate((base, middle))}
+    targets = np.concatenate([np.zeros((5, 6)), np.stack([places[name] for name in body.joints], axis=1)], axis=1)
+    _, tips = model_places(body, hand_coordinates(body_model(body), targets))
+    wrist_from_robot = np.array([[0, 0, -1], [-1, 0, 0], [0, 1, 0]])  # fingers z to -x, palm x to -y, side y to z
+    wanted = keypoints_of(values)[:, TIPS]  # thumb, index, middle, ring
+    return tips, wanted[:, [1, 2, 3, 0]] @ wrist_from_robot.T
 
 
 def write(

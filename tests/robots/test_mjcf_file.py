@@ -6,8 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjx_hand.bodies.body_places import body_model, model_places
-from mjx_hand.bodies.coordinates import hand_coordinates
+from mjx_hand.bodies.body_places import body_model
 from mjx_hand.bodies.robot_body import robot_body
 from mjx_hand.cli.main import main
 from mjx_hand.errors import InputError
@@ -71,17 +70,8 @@ def write(folder: Path, change=lambda text: text) -> Path:
 def test_the_hand_moves_as_its_own_kinematics_say(tmp_path):
     body = robot_body(write(tmp_path))
     assert (body.side, len(body.joints), len(body.coupled)) == ("right", 8, 4)
-    values = little_hand.postures(5)
-    places = {
-        f"{d}_{part}": values[:, k, j]
-        for k, d in enumerate(little_hand.DIGITS)
-        for j, part in enumerate(("one", "two"))
-    }
-    targets = np.concatenate([np.zeros((5, 6)), np.stack([places[name] for name in body.joints], axis=1)], axis=1)
-    _, tips = model_places(body, hand_coordinates(body_model(body), targets))
-    wanted = little_hand.keypoints_of(values)[:, little_hand.TIPS]
-    wrist_from_robot = np.array([[0, 0, -1], [-1, 0, 0], [0, 1, 0]])
-    np.testing.assert_allclose(tips, wanted[:, [1, 2, 3, 0]] @ wrist_from_robot.T, atol=1e-6)
+    tips, wanted = little_hand.tips_of(body, "{}_one", "{}_two")
+    np.testing.assert_allclose(tips, wanted, atol=1e-6)
     limits = dict(zip(body.joints, body.gains.force_limit, strict=True))
     assert limits["index_one"] == pytest.approx(0.4)
     assert limits["index_two"] == pytest.approx(0.6)  # 0.3 at a gear of 2

@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mjx_hand.bodies.body_places import body_model, model_places
-from mjx_hand.bodies.coordinates import hand_coordinates
 from mjx_hand.bodies.robot_body import robot_body
 from mjx_hand.errors import InputError
 from mjx_hand.robots.model.links import hand_links
@@ -41,19 +39,8 @@ def test_the_hand_moves_as_its_urdf_says(little):
     assert little.fingers == ("index", "middle", "ring", "thumb")
     assert len(little.joints) == 8
     assert len(little.coupled) == 4
-    values = little_hand.postures(5)
-    places = {
-        f"{d}_{part}_joint": values[:, k, j]
-        for k, d in enumerate(little_hand.DIGITS)
-        for j, part in enumerate(("base", "middle"))
-    }
-    targets = np.concatenate([np.zeros((5, 6)), np.stack([places[name] for name in little.joints], axis=1)], axis=1)
-    _, tips = model_places(little, hand_coordinates(body_model(little), targets))
-    wanted = little_hand.keypoints_of(values)[:, little_hand.TIPS]  # thumb, index, middle, ring
-    wrist_from_robot = np.array(
-        [[0, 0, -1], [-1, 0, 0], [0, 1, 0]]
-    )  # fingers z to -x, palm x to -y, thumb's side y to z
-    np.testing.assert_allclose(tips, wanted[:, [1, 2, 3, 0]] @ wrist_from_robot.T, atol=1e-6)
+    tips, wanted = little_hand.tips_of(little, "{}_base_joint", "{}_middle_joint")
+    np.testing.assert_allclose(tips, wanted, atol=1e-6)
 
 
 def test_actuators_reach_their_targets_and_ties_hold(little):

@@ -15,6 +15,7 @@ from envs.demonstrations.from_recording.grasp_pose import GraspPose, spins
 from envs.demonstrations.from_recording.observed import ObservedSequence
 from envs.demonstrations.observation.settled_path import held_rotation
 from mjx_hand.motion.smooth import smooth_rows
+from mjx_hand.smoothstep import smoothstep
 
 _HALF = 0.5  # of what they disagree by is the object's
 _FADE = 0.4  # s from a rest on
@@ -73,5 +74,4 @@ def _shares(frames: int, lifted: int, fps: float, rests: bool) -> Float[np.ndarr
     off = (frame - lifted) / fps
     if rests:
         off = np.minimum(off, (frames - 1 - frame) / fps)
-    x = np.clip(off / _FADE, 0, 1)
-    return x * x * (3 - 2 * x)
+    return smoothstep(off / _FADE)

@@ -12,6 +12,7 @@ from envs.demonstrations.observation.solids import Solid
 from envs.demonstrations.observation.stillness import ObjectPath, mean_rotations
 from mjx_hand.motion.gaps import fill_turns, spans
 from mjx_hand.motion.resample import matrix_quaternions, quaternion_matrices
+from mjx_hand.smoothstep import smoothstep
 
 _UP = np.array([0.0, 0.0, 1.0])
 _LEANS = np.deg2rad(20.0)  # what stands further than this from flat leans on something
@@ -207,8 +208,7 @@ def _shares(rests: Sequence[Rest], frames: int, fps: float) -> list[np.ndarray]:
     raw = []
     for rest in rests:
         off = np.maximum(np.maximum(rest.begin / fps - time, time - (rest.end - 1) / fps), 0.0)
-        x = np.clip(1 - off / _FADE, 0, 1)
-        raw.append(x * x * (3 - 2 * x))
+        raw.append(smoothstep(1 - off / _FADE))
     total = np.maximum(np.sum(raw, axis=0), 1.0)
     inside = np.array([[rest.begin <= t < rest.end for t in range(frames)] for rest in rests])
     shares = np.where(inside.any(axis=0), inside, np.array(raw) / total)

@@ -11,6 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.on_robot.pads import Pads
 from mjx_hand.motion.demonstration import Demonstration
+from mjx_hand.motion.gaps import spans
+from mjx_hand.smoothstep import smoothstep
 
 _ONTO = 0.1  # s from touching to going with the object, and back
 
@@ -22,15 +24,13 @@ def followed_places(
 
     Seen from the object a pad is always as far from the person's as at the grasp, but for the person's slip meanwhile.
     """
-    position, turn = (
-        demonstration.object_pose[:, :3],
-        Rotation.from_quat(demonstration.object_pose[:, 3:], scalar_first=True),
-    )
+    position = demonstration.object_pose[:, :3]
+    turn = Rotation.from_quat(demonstration.object_pose[:, 3:], scalar_first=True)
     wanted = np.empty_like(pads.places)
     for k, place in enumerate(grasp):
         own = turn.inv().apply(pads.places[:, k] - position)  # the person's
         stuck = own.copy()
-        for first, end in _spells(pads.touching[:, k]):
+        for first, end in spans(pads.touching[:, k]):
             inside = first <= pads.grasp < end
             stuck[first:end] = own[pads.grasp] if inside else own[first:end].mean(axis=0)
         share = _onto(pads.touching[:, k], demonstration.motion.fps)[:, None]
@@ -39,15 +39,8 @@ def followed_places(
     return wanted
 
 
-def _spells(touching: Bool[np.ndarray, "t"]) -> list[tuple[int, int]]:
-    """First frame, and the one after the last, of each time that a finger touches."""
-    steps = np.diff(np.pad(touching.astype(int), 1))
-    return list(zip(np.flatnonzero(steps > 0).tolist(), np.flatnonzero(steps < 0).tolist(), strict=True))
-
-
 def _onto(touching: Bool[np.ndarray, "t"], fps: float) -> Float[np.ndarray, "t"]:
     """How much a pad goes with the object, from 0 to 1 and back without a jolt; a demonstration's ends are none."""
     ramp = round(_ONTO * fps) + 1
     inside = np.asarray(distance_transform_edt(np.pad(touching, ramp, mode="edge")))[ramp:-ramp]
-    share = np.clip(inside / ramp, 0.0, 1.0)
-    return share**2 * (3 - 2 * share)
+    return smoothstep(inside / ramp)

@@ -10,6 +10,8 @@ import numpy as np
 import trimesh
 from jaxtyping import Float, Int
 
+from mjx_hand.smoothstep import smoothstep
+
 RINGS = 6  # between the border and the pole
 # How far below the neighbour's skin a dome stays, once it is away from its border, as a share of the way to the joint.
 DEPTH = 0.06
@@ -70,18 +72,12 @@ def dome(
     ball = (1 - DEPTH) * np.linalg.norm(nearest - centre, axis=1).min()
     sunk = 1 - DEPTH * np.minimum(1, 3 * along)[:, None]
     held = np.clip(reach * (1 - DEPTH), ball, WIDEST * ball)
-    neck = _ease((angle * along[:, None] - TONGUE[0]) / (TONGUE[1] - TONGUE[0]))
-    crown = _ease((along - 0.6) / 0.4)[:, None]
+    neck = smoothstep((angle * along[:, None] - TONGUE[0]) / (TONGUE[1] - TONGUE[0]))
+    crown = smoothstep((along - 0.6) / 0.4)[:, None]
     radius = (1 - neck) * reach * sunk + neck * held
     radius = np.append(((1 - crown) * radius + crown * ball).ravel(), ball)
     radius = np.minimum(radius, np.append(np.repeat(sunk, count), 1 - DEPTH) * distance)
     return Dome(corners, shares, 1 - radius / distance, _rings(count))
-
-
-def _ease(x: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
-    """From 0 to 1 without a kink."""
-    x = np.clip(x, 0, 1)
-    return x * x * (3 - 2 * x)
 
 
 def exits(
