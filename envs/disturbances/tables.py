@@ -56,7 +56,7 @@ def disturbance_tables(
     each = len(variations[0])
     qpos, qvel = (np.repeat(np.asarray(rows[:, 0]), each, axis=0) for rows in (starts.qpos, starts.qvel))
     every = [(d, variation) for d, own in zip(demonstrations, variations, strict=True) for variation in own]
-    qpos[:, controls.shape[-1] :] = [varied_pose(d, variation) for d, variation in every]
+    qpos[:, -_FREE:] = [varied_pose(d, variation) for d, variation in every]
     return DisturbanceTables(
         first=states(np.arange(len(every), dtype=np.int32), qpos, qvel, np.repeat(controls[:, 0], each, axis=0)),
         elsewhere=jnp.array([variation.is_elsewhere for _, variation in every]),

@@ -43,7 +43,7 @@ _SAME_FACE = 0.8  # cosine between the person's way into the object and the robo
 _ALONG_WRAP, _AROUND = 0.02, 0.01  # m that weigh 1 of a hand that wraps: along the surface, and of further links off it
 _TOUCHES = 0.002  # m off the surface at which a link bears
 _STEPS, _FEW = 60, 6
-_ANYWHERE = 0.3  # m: no link of a hand at an object is farther
+_ANYWHERE = 10.0  # m: of every link, also where a step of the search throws the hand far from the object
 
 
 @dataclasses.dataclass(frozen=True)
@@ -121,10 +121,8 @@ class _Bringing:
 
     def brought(self) -> Brought:
         targets, off, depth, gap = self._grasp()
-        fingers, name = (
-            self.pads.fingers,
-            f"{self.body.name!r} cannot grasp as demonstrated ({self.demonstration.grasp})",
-        )
+        fingers = self.pads.fingers
+        name = f"{self.body.name!r} cannot grasp as demonstrated ({self.demonstration.grasp})"
         far = not self.pads.wraps and (off.max() > 2 * _ALONG + _OFF or gap.max() > _OFF)
         if far or depth > 2 * _DEPTH:
             raise LeftOut(
@@ -159,10 +157,8 @@ class _Bringing:
         wrist = self.wrist[frame]
         wanted = [self.last[finger] for finger in pads.fingers]
         along = _ALONG_WRAP if pads.wraps else _ALONG
-        closing = [
-            k for k, finger in enumerate(self.touch.fingers) if finger in ("", *pads.fingers) and k not in wanted
-        ]
-        closing = closing if pads.wraps else []
+        around = ("", *pads.fingers) if pads.wraps else ()  # phalanges and the palm of a hand that wraps
+        closing = [k for k, finger in enumerate(self.touch.fingers) if finger in around and k not in wanted]
 
         def equations(targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             self._place(targets, frame)
@@ -170,9 +166,8 @@ class _Bringing:
             rows, values = [], []
             for link, place, inward in zip(wanted, places, pads.inward, strict=True):
                 gap, point, way = near[link]
-                if (
-                    not pads.wraps and way @ inward < _SAME_FACE
-                ):  # as around a corner: what would touch, were it on this face
+                if not pads.wraps and way @ inward < _SAME_FACE:
+                    # As around a corner: what would touch, were it on this face.
                     point, way = self.touch.foremost(link, inward), inward
                     gap = float(inward @ (place - point))
                 jacobian = self._jacobian(link, point)
@@ -183,7 +178,7 @@ class _Bringing:
                 if link not in wanted and gap < _CLEAR:
                     rows.append((way @ self._jacobian(link, point))[None] / _INSIDE)
                     values.append(np.array([(_CLEAR - gap) / _INSIDE]))
-                elif link in closing:  # phalanges and the palm of a hand that wraps
+                elif link in closing:
                     rows.append(-(way @ self._jacobian(link, point))[None] / _AROUND)
                     values.append(np.array([(gap - _CLEAR) / _AROUND]))
             for finger, site in self.sites.items():
