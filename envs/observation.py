@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from envs.approach import followed
+from envs.approach import followed_target
 from envs.physics.engine import PhysicsState
 from envs.reference import Reference
 from envs.scene import NUM_WRIST
@@ -83,7 +83,7 @@ def _seen(
     frames = jnp.concatenate([frame[None], later])
     targets = reference.targets[demonstration, frames]
     if displacement is not None:
-        targets = targets + jax.vmap(lambda k: followed(reference, demonstration, k, displacement))(frames)
+        targets = targets + jax.vmap(lambda k: followed_target(reference, demonstration, k, displacement))(frames)
     hand, first = body.of_targets(physics.qpos), body.num_coordinates
     object_pose = physics.qpos[first:]
     return Seen(

@@ -14,7 +14,7 @@ import numpy as np
 from brax.envs.base import Env, State
 from jaxtyping import Array, Float, Int
 
-from envs.approach import followed
+from envs.approach import followed_target
 from envs.assistance import assistance
 from envs.disturbances.episode import delayed, pushing, seen_pose
 from envs.disturbances.randomize import Randomize
@@ -229,7 +229,7 @@ class TrackingEnv(Env):
         frame = jnp.minimum(twin.frame + 1, self.reference.length[twin.demonstration] - 1)
         target = self.reference.controls[twin.demonstration, frame] + residual
         if twin.episode is not None:
-            target = target + followed(self.reference, twin.demonstration, frame, twin.episode.displacement)
+            target = target + followed_target(self.reference, twin.demonstration, frame, twin.episode.displacement)
         return frame, residual, jnp.clip(target, self.tables.low, self.tables.high)
 
     def _assistance(self, twin: Twin, frame: Int[Array, ""], progress: Float[Array, ""]) -> Float[Array, "6"]:

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from mjx_hand.smoothstep import smoothstep
+
 HELD_AWAY = 0.01  # m from its first place: an object that is held
 _SAME = 1e-5  # m, rad: less is rounding, and leaves the path as it is to the last bit
 _RAMP = 0.5  # s in which the path leaves the demonstrated one at first
@@ -27,7 +29,7 @@ def approach_weights(object_pose: Float[np.ndarray, "t 7"], rate: float) -> Floa
     away = np.linalg.norm(object_pose[:, :3] - object_pose[0, :3], axis=1) > HELD_AWAY
     held = int(away.argmax()) if away.any() else len(frames)
     ramp = max(min(_RAMP * rate, held / 2), 1.0)
-    return _smooth(frames / ramp) * (1 - _smooth((frames - held) / (_RETURN * rate)))
+    return smoothstep(frames / ramp) * (1 - smoothstep((frames - held) / (_RETURN * rate)))
 
 
 def displacement(seen: Any, demonstrated: Any, xp: Any) -> Any:
@@ -64,9 +66,14 @@ def moved_wrist(wrist: Any, base: Any, centre: Any, moved: Any, xp: Any) -> Any:
     return xp.concatenate([base.T @ place - wrist[:3], change]) * xp.any(moved != 0)
 
 
-def _smooth(share: Float[np.ndarray, "t"]) -> Float[np.ndarray, "t"]:
-    share = np.clip(share, 0.0, 1.0)
-    return share * share * (3 - 2 * share)
+def followed(target: Any, base: Any, centre: Any, moved: Any, xp: Any) -> Any:
+    """What is added to demonstrated targets (m, rad) where the path is moved: as `moved_wrist`, and no joint changes.
+
+    Args:
+        target: (u,) the wrist's slides and turns, then the hand's joints.
+        base, centre, moved, xp: as of `moved_wrist`.
+    """
+    return xp.concatenate([moved_wrist(target[:6], base, centre, moved, xp), xp.zeros_like(target[6:])])
 
 
 def _about_z(angle: Any, xp: Any) -> Any:

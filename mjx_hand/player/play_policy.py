@@ -1,6 +1,7 @@
 """`play_policy`: an exported policy in plain MuJoCo; JAX is not imported."""
 
 import dataclasses
+from functools import cached_property
 from pathlib import Path
 
 import mujoco
@@ -8,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from mjx_hand.errors import InputError
-from mjx_hand.player.approach import approach_weights, displacement, moved_wrist
+from mjx_hand.player.approach import approach_weights, displacement, followed
 from mjx_hand.player.exported_policy import ExportedPolicy, load_exported_policy
 from mjx_hand.player.features import WRIST, Feature, HandNames, Seen, feature_table
 from mjx_hand.player.tracking_reference import TrackingReference, load_tracking_reference
@@ -97,7 +98,6 @@ class Player:
         self.frame, self.residual = 0, np.zeros(len(joints), np.float32)
         self.data.qpos[:], self.data.qvel[:] = reference.start_qpos, reference.start_qvel
         self._weights = approach_weights(reference.object_pose, reference.rate)
-        self._displacement: np.ndarray | None = None
 
     def step(self) -> None:
         """Look, act, and let the physics run to the next frame; past the end the last frame is held."""
@@ -114,27 +114,19 @@ class Player:
         seen = self._seen()
         return np.concatenate([np.ravel(feature.value(seen)) for feature in self._features])
 
-    @property
-    def displacement(self) -> Float[np.ndarray, "3"] | None:
-        """Where the object stood when the episode began, from where the demonstration has it: x, y (m), turn (rad).
+    @cached_property
+    def displacement(self) -> Float[np.ndarray, "3"]:
+        """Where the object was when it was first looked at, from its demonstrated place: x, y (m), turn (rad).
 
-        None where that is the same, or the policy's task does not follow the object.
+        Zero if the policy's task does not follow the object.
         """
-        moved = self._displacement
-        if moved is None:
-            moved = displacement(self.data.qpos[-_FREE:], self.reference.object_pose[0].astype(float), np)
-            moved = self._displacement = moved * bool(self.policy.contract.get("follow_object", False))
-        return moved if moved.any() else None
+        moved = displacement(self.data.qpos[-_FREE:], self.reference.object_pose[0].astype(float), np)
+        return moved * bool(self.policy.contract.get("follow_object", False))
 
     def _followed(self, frame: int) -> Float[np.ndarray, "u"]:
         """What is added to the demonstrated targets at a frame, because the object stands elsewhere."""
-        target = self.reference.targets[frame].astype(float)
-        added = np.zeros_like(target)
-        if (moved := self.displacement) is not None:
-            wrist, centre = target[: len(WRIST)], self.reference.object_pose[0, :3]
-            weighted = moved * self._weights[frame]
-            added[: len(WRIST)] = moved_wrist(wrist, self.reference.base, centre, weighted, np)
-        return added
+        reference, moved = self.reference, self.displacement * self._weights[frame]
+        return followed(reference.targets[frame].astype(float), reference.base, reference.object_pose[0, :3], moved, np)
 
     def _seen(self) -> Seen:
         reference, data, frame = self.reference, self.data, self.frame

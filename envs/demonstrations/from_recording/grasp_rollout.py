@@ -80,10 +80,8 @@ class GraspRollout:
         act, worlds = self.act, self.worlds
         trajectory = grasp_trajectory(act, grasps)
         targets, controls, pose = self._commands(trajectory)
-        settled, begin = (
-            act.closed + _SETTLED,
-            max(int(np.argmax(act.arriving_share > 0)) - 1, 0),
-        )  # as recorded until then
+        settled = act.closed + _SETTLED
+        begin = max(int(np.argmax(act.arriving_share > 0)) - 1, 0)  # as recorded until then
         worlds.set_models([self.heavy if fixed else self.model] * self.count)
         worlds.state[:] = 0.0
         qpos, qvel, ctrl = (worlds.bind(name) for name in ("qpos", "qvel", "ctrl"))

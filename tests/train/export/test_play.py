@@ -17,7 +17,9 @@ from envs.scene import demonstration_spec
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import load_demonstration
 from mjx_hand.objects.description import ObjectDescription
-from mjx_hand.player.play_policy import play_policy
+from mjx_hand.player.exported_policy import load_exported_policy
+from mjx_hand.player.play_policy import Player, play_policy
+from mjx_hand.player.tracking_reference import load_tracking_reference
 from mjx_hand.pytree import replace
 from train.experiment.bundled_policies import bundled_env, demonstration_path
 from train.experiment.setup import rolled_out
@@ -65,6 +67,23 @@ def test_the_library_reproduces_the_rollout(exported: Path, own: tuple[Rollouts,
     assert np.linalg.norm(played["path"][:, :3] - rollouts.object_pose[0, :, :3], axis=1).max() < 1e-3
     assert bool(played["success"]) is bool(scores.scores["manip_trans_object"][0]) is True
     assert 100 * played["error"].mean() == pytest.approx(scores.scores["tracking_error_cm"][0], abs=0.02)
+
+
+def test_an_object_elsewhere_is_gone_to_and_brought_back(exported: Path):
+    """The wrist stands to the object as recorded until that is held, and is where it was recorded at the end."""
+    file = exported / "demonstrations/000.npz"
+    policy, reference = load_exported_policy(exported / "policy.npz"), load_tracking_reference(file)
+    usual, moved = (Player(policy, reference, file.parent) for _ in range(2))
+    moved.data.qpos[-7:-5] += (0.016, -0.012)
+    away = np.linalg.norm(reference.object_pose[:, :3] - reference.object_pose[0, :3], axis=1) > 0.01
+    apart = []
+    for _ in range(reference.num_frames - 1):
+        for player in (usual, moved):
+            player.step()
+        apart.append(moved.data.body("wrist").xpos - usual.data.body("wrist").xpos)
+    np.testing.assert_allclose(apart[int(away.argmax()) - 1], (0.016, -0.012, 0.0), atol=0.008)
+    assert np.linalg.norm(apart[-1]) < 0.01
+    assert np.linalg.norm(moved.data.qpos[-7:-4] - reference.object_pose[-1, :3]) < 0.02
 
 
 def test_the_example_reproduces_the_rollout(exported: Path, own: tuple[Rollouts, Evaluation], tmp_path: Path):
