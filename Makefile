@@ -60,8 +60,8 @@ smoke: $(STAMP)  ## run a few tests, and a tiny training on every engine, under 
 	if [ ! -f $(NEWEST)/.installed ] || [ requirements.lock -nt $(NEWEST)/.installed ]; then \
 	  echo "making $(NEWEST) with $$newest"; \
 	  $(BIN)/uv venv --quiet --clear --python "$$newest" $(NEWEST); \
-	  $(BIN)/uv pip install --quiet --python $(NEWEST)/bin/python --require-hashes -r requirements.lock; \
-	  $(BIN)/uv pip install --quiet --python $(NEWEST)/bin/python --no-deps -e . warp-lang==$(WARP); \
+	  $(BIN)/uv pip install --quiet --compile-bytecode --python $(NEWEST)/bin/python --require-hashes -r requirements.lock; \
+	  $(BIN)/uv pip install --quiet --compile-bytecode --python $(NEWEST)/bin/python --no-deps -e . warp-lang==$(WARP); \
 	  touch $(NEWEST)/.installed; \
 	fi; \
 	$(NEWEST)/bin/python -c 'import jax, platform; print(f"Python {platform.python_version()}, jax {jax.__version__}")'; \
