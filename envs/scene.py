@@ -8,6 +8,7 @@ from jaxtyping import Float
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
+from envs.hand_contacts import SOLREF, meet_as_ground, meet_as_hand, meet_as_object, meet_itself, meet_nobody
 from mjx_hand.bodies.body import NUM_WRIST as NUM_WRIST
 from mjx_hand.bodies.body import Body
 from mjx_hand.bodies.human_body import body_of
@@ -23,9 +24,6 @@ OBJECT, SUPPORT, TABLE, SPARE = "object", "support", "table", "spare"
 # around a handle has 13 of each, the other types fewer.
 MJX_CAPS = {"max_contact_points": 16, "max_geom_pairs": 16}
 
-# Who meets whom: (contype, conaffinity). The hand meets the object alone; the object also boxes and table. Spare boxes
-# meet nobody; without a contype MuJoCo would leave them out of its trees, whose sizes must agree.
-_HAND_MEETS, _OBJECT_MEETS, _GROUND_MEETS, _SPARE_MEETS = (1, 0), (2, 1), (0, 2), (4, 0)
 _GEOM = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
     "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
@@ -45,6 +43,7 @@ def scene_spec(
     visual: bool = False,
     spare: int = 0,
     assisted: bool = False,
+    contacts: str = "object",
 ) -> mujoco.MjSpec:
     """The scene. Compiled, its qpos is the wrist's 3 slides (m) and 3 turns (rad), the hand's
     joints, the object's free joint.
@@ -61,6 +60,8 @@ def scene_spec(
         spare: how many boxes to add that touch nothing.
         assisted: with six motors on the object, after the hand's actuators: a force (N, world axes) and a torque (N m,
             the object's axes).
+        contacts: what the hand meets: the object alone, or also table and support ("ground"), its own links ("self"),
+            or "all".
     """
     if description.kind not in OBJECT_KINDS:
         raise InputError(f"object kind {description.kind!r} is not known; valid: {', '.join(OBJECT_KINDS)}")
@@ -74,12 +75,13 @@ def scene_spec(
         body.gravcomp = 1.0  # the arm that is not modelled carries the hand
     for geom in spec.geoms:
         if geom.contype:
-            geom.contype, geom.conaffinity = _HAND_MEETS
+            meet_as_hand(geom, contacts)
             _contact(geom, description.friction, condim=4)  # torsion too: a pad is an area, not a point
-    _add_ground(spec, support, support_position, description.friction)
+    meet_itself(spec, contacts, coarse=body_of(hand).rigid is None)
+    _add_ground(spec, support, support_position, description.friction, contacts)
     for k in range(spare):
         box = spec.worldbody.add_geom(name=f"{SPARE}{k}", type=_GEOM["box"], size=[0.001] * 3, pos=[0.0, 0.0, -0.1])
-        box.contype, box.conaffinity = _SPARE_MEETS
+        meet_nobody(box)
     body = spec.worldbody.add_body(name=OBJECT)
     body.add_freejoint(name=OBJECT)
     for k, gear in enumerate(np.eye(6) if assisted else ()):
@@ -87,7 +89,7 @@ def scene_spec(
         motor.gear = gear
     for geom in _object_geoms(spec, body, description):
         geom.rgba = (0.9, 0.35, 0.2, 1.0)
-        geom.contype, geom.conaffinity = _OBJECT_MEETS
+        meet_as_object(geom)
         _contact(geom, description.friction)
     # MJX alone reads these: it works every possible contact out, and is a tenth as quick without a cap.
     for name, most in MJX_CAPS.items():
@@ -112,11 +114,15 @@ def _object_geoms(spec: mujoco.MjSpec, body: mujoco.MjsBody, description: Object
 def _contact(geom: mujoco.MjsGeom, friction: float, condim: int = 3) -> None:
     geom.condim = condim
     geom.friction = [friction, 0.005, 0.0001]
-    geom.solref = [0.01, 1.0]  # 0.02 costs a pinch twenty points of success
+    geom.solref = SOLREF
 
 
 def _add_ground(
-    spec: mujoco.MjSpec, support: Float[np.ndarray, "b 3"], position: Float[np.ndarray, "b 3"], friction: float
+    spec: mujoco.MjSpec,
+    support: Float[np.ndarray, "b 3"],
+    position: Float[np.ndarray, "b 3"],
+    friction: float,
+    contacts: str,
 ) -> None:
     table = spec.worldbody.add_geom(
         name=TABLE, type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1.0, 1.0, 0.01], rgba=(0.82, 0.82, 0.8, 1.0)
@@ -128,7 +134,7 @@ def _add_ground(
         for k, (half, centre) in enumerate(zip(support, position, strict=True))
     ]
     for geom in (table, *boxes):
-        geom.contype, geom.conaffinity = _GROUND_MEETS
+        meet_as_ground(geom, contacts)
         _contact(geom, friction)
 
 
@@ -146,6 +152,7 @@ def demonstration_spec(
     visual: bool = False,
     spare: int = 0,
     assisted: bool = False,
+    contacts: str = "object",
 ) -> mujoco.MjSpec:
     """The scene that a demonstration takes place in; arguments as of `scene_spec`."""
     return scene_spec(
@@ -158,6 +165,7 @@ def demonstration_spec(
         visual=visual,
         spare=spare,
         assisted=assisted,
+        contacts=contacts,
     )
 
 
@@ -173,6 +181,7 @@ def demonstration_models(
     *,
     gains: Gains | None = None,
     assisted: bool = False,
+    contacts: str = "object",
 ) -> list[mujoco.MjModel]:
     """The scenes of demonstrations that run side by side, each on its own hand.
 
@@ -180,7 +189,7 @@ def demonstration_models(
     touch nothing.
     """
     return [
-        demonstration_spec(d, hand, gains=gains, spare=spare, assisted=assisted).compile()
+        demonstration_spec(d, hand, gains=gains, spare=spare, assisted=assisted, contacts=contacts).compile()
         for d, hand, spare in zip(demonstrations, hands, spare_boxes(demonstrations), strict=True)
     ]
 

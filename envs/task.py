@@ -6,6 +6,7 @@ import math
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from envs.hand_contacts import check_contacts
 from envs.rewards import RewardWeights
 from mjx_hand.errors import InputError
 
@@ -36,6 +37,8 @@ class Task:
         lookahead: how many frames ahead the policy sees the reference.
         follow_object: whether the wrist's path goes to where the object is seen to stand, and back to the demonstrated
             one once it is held (`mjx_hand.player.approach`).
+        contacts: what the hand meets: "object" for nothing else, or also table and support ("ground"), its own links
+            ("self"), or "all".
         observe_properties: whether the policy sees the object's mass and friction, which no camera does.
     """
 
@@ -55,6 +58,7 @@ class Task:
     grip_force: float | None = None
     lookahead: tuple[int, ...] = (1, 4, 12)
     follow_object: bool = True
+    contacts: str = "object"
     observe_properties: bool = False
 
     def __post_init__(self):
@@ -81,6 +85,7 @@ class Task:
             )
         if self.grip_force is not None and not self.grip_force >= 0:
             raise InputError(f"task.grip_force is {self.grip_force}; it must not be negative")
+        check_contacts(self.contacts)
         if not self.lookahead or any(k < 1 for k in self.lookahead):
             raise InputError(
                 f"task.lookahead is {self.lookahead}; it must list frames ahead, each at least 1, such as [1,4,12]"

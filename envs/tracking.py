@@ -84,12 +84,12 @@ class TrackingEnv(Env):
         reference = cached_reference(demonstrations, hands, self.task.grip_force, gains)
         self.assisted = self.task.assist > 0
         self.randomize = randomize
-        motors = self.assisted or randomize is not None
-        self.models = demonstration_models(demonstrations, hands, gains=gains, assisted=motors)
+        motors, contacts = self.assisted or randomize is not None, self.task.contacts
+        self.models = demonstration_models(demonstrations, hands, gains=gains, assisted=motors, contacts=contacts)
         self.variations = draw_variations(randomize or Randomize.only(), len(self.demonstrations), _VARIATION_SEED)
         scenes = self.models
         if randomize is not None:
-            scenes = varied_models(self.demonstrations, self.hands, self.variations, gains)
+            scenes = varied_models(self.demonstrations, self.hands, self.variations, gains, contacts)
         self.engine = make_engine(engine, scenes, self.task.substeps)
         self.dt = float(self.models[0].opt.timestep * self.task.substeps)
         self.fps = demonstrations[0].motion.fps

@@ -23,6 +23,7 @@ def varied_model(
     *,
     spare: int = 0,
     motors: bool = False,
+    contacts: str = "object",
 ) -> mujoco.MjModel:
     """The scene of a demonstration with a variation.
 
@@ -33,9 +34,11 @@ def varied_model(
         gains: of the hand as it is meant.
         spare: boxes to add that touch nothing.
         motors: six on the object, as `scene_spec` has them.
+        contacts: what the hand meets, as `scene_spec` has it.
     """
     varied = dataclasses.replace(demonstration, object=varied_object(demonstration.object, variation))
-    spec = demonstration_spec(varied, hand, gains=varied_gains(gains, variation.gains), spare=spare, assisted=motors)
+    own = varied_gains(gains, variation.gains)
+    spec = demonstration_spec(varied, hand, gains=own, spare=spare, assisted=motors, contacts=contacts)
     centre = demonstration.object_pose[0, :3] * (1, 1, 0)
     turn = Rotation.from_rotvec([0.0, 0.0, variation.turn])
     for k, place in enumerate(demonstration.support_position):
@@ -54,10 +57,11 @@ def varied_models(
     hands: Sequence[RigidHand | Body],
     variations: Sequence[Sequence[Variation]],
     gains: Gains,
+    contacts: str = "object",
 ) -> list[mujoco.MjModel]:
     """The scenes of all, a demonstration's own one after the other, with motors on their objects."""
     return [
-        varied_model(d, hand, variation, gains, spare=spare, motors=True)
+        varied_model(d, hand, variation, gains, spare=spare, motors=True, contacts=contacts)
         for d, hand, own, spare in zip(demonstrations, hands, variations, spare_boxes(demonstrations), strict=True)
         for variation in own
     ]

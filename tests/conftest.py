@@ -15,8 +15,8 @@ if sys.platform == "linux":
     os.environ.setdefault("MUJOCO_GL", "egl")
 
 # Before JAX's first import, and for the processes that tests start: they spend more time compiling than running what is
-# compiled, so that it is not worth optimising. XLA's older emitters make code in 40 % of the newer ones' time; jaxlib has
-# them up to 0.10, and a later one ends the process when it is given the flag.
+# compiled, so that it is not worth optimising. XLA's older emitters make code in 40 % of the newer ones' time; jaxlib
+# has them up to 0.10, and a later one ends the process when it is given the flag.
 _QUICK = ["--xla_backend_optimization_level=0"]
 if tuple(int(part) for part in version("jaxlib").split(".")[:2]) < (0, 11):
     _QUICK.append("--xla_cpu_use_fusion_emitters=false")

@@ -1,6 +1,6 @@
 """How deep rollouts put fingers into each other, and the hand into table and support, whether or not these touch.
 
-The twin's hand meets the object alone by default, so that nothing but the policy keeps it out of itself and the ground.
+Where the hand meets the object alone (`Task.contacts`), nothing but the policy keeps it out of itself and the ground.
 """
 
 import itertools
@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from envs.evaluation.rollout import Rollouts
+from envs.hand_contacts import finger_pairs
 from envs.scene import OBJECT, SPARE
 from mjx_hand.pytree import pytree
 
@@ -60,23 +61,10 @@ def _pairs(model: mujoco.MjModel) -> tuple[Int[np.ndarray, "f 2"], Int[np.ndarra
     hand_root = model.body_rootid[model.jnt_bodyid[model.actuator_trnid[0, 0]]]
     solid = model.geom_contype > 0
     hand = [g for g in np.flatnonzero(solid) if model.body_rootid[model.geom_bodyid[g]] == hand_root]
-    lines = {g: _line(model, int(model.geom_bodyid[g])) for g in hand}
-    palm = len(list(itertools.takewhile(lambda level: len(set(level)) == 1, zip(*lines.values(), strict=False))))
-    finger = {g: line[palm] for g, line in lines.items() if len(line) > palm}
-    fingers = [pair for pair in itertools.combinations(finger, 2) if finger[pair[0]] != finger[pair[1]]]
     fixed = np.flatnonzero((model.body_weldid[model.geom_bodyid] == 0) & (model.geom_conaffinity > 0))
     named = [g for g in fixed if not model.geom(g).name.startswith((SPARE, OBJECT))]
     ground = list(itertools.product(hand, named))
-    return np.array(fingers, int).reshape(-1, 2), np.array(ground, int).reshape(-1, 2)
-
-
-def _line(model: mujoco.MjModel, body: int) -> list[int]:
-    """Bodies from below the world down to this one."""
-    line = []
-    while body > 0:
-        line.append(body)
-        body = int(model.body_parentid[body])
-    return line[::-1]
+    return np.array(finger_pairs(model, hand), int).reshape(-1, 2), np.array(ground, int).reshape(-1, 2)
 
 
 def _depths(model: mujoco.MjModel, data: mujoco.MjData, pairs: Int[np.ndarray, "p 2"]) -> Float[np.ndarray, "p"]:

@@ -30,6 +30,7 @@ warp.config.log_level = warp.LOG_WARNING  # pyright: ignore[reportAttributeAcces
 
 _PLANE, _SPHERE = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_SPHERE
 _CAPSULE, _CYLINDER = mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER
+_MESH = mujoco.mjtGeom.mjGEOM_MESH
 
 
 def make(models: Sequence[mujoco.MjModel], substeps: int) -> "WarpEngine":
@@ -211,4 +212,12 @@ def _capacity(model: mujoco.MjModel) -> tuple[int, int, int]:
             contacts += points
             rows += points * int(max(model.geom_condim[i], model.geom_condim[j]))
             convex += not shapes & {_PLANE, _SPHERE} and (_CYLINDER in shapes or _CAPSULE not in shapes)
+    # Of named pairs, which are links of the hand: capsules or hulls.
+    hulls = [
+        _MESH in set(model.geom_type[[a, b]].tolist()) for a, b in zip(model.pair_geom1, model.pair_geom2, strict=True)
+    ]
+    points = [8 if hull else 2 for hull in hulls]
+    contacts += sum(points)
+    rows += int(np.dot(points, model.pair_dim))
+    convex += sum(hulls)
     return contacts, convex, rows

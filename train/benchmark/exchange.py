@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from envs.scene import base_rotation, scene_spec
+from envs.scene import demonstration_spec
 from envs.tracking import TrackingEnv
 from train.benchmark.contestants import Script, make_script
 
@@ -47,7 +47,7 @@ def scene_xml(env: TrackingEnv) -> str:
     """The MJCF of the environment's scenes, which are alike but for numbers, as MuJoCo 3 reads it too."""
     most = max(range(len(env.demonstrations)), key=lambda k: len(env.demonstrations[k].support))
     d = env.demonstrations[most]
-    spec = scene_spec(env.hands[most], d.object, d.support, d.support_position, base_rotation(d))
+    spec = demonstration_spec(d, env.hands[most], contacts=env.task.contacts)
     spec.compile()
     return spec.to_xml().replace(_INPUT, "")
 

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from envs.physics.solver import gauss_seidel
-from envs.scene import base_rotation, scene_spec
+from envs.scene import demonstration_spec
 from mjx_hand.bodies.body import Body
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.rigid.rigid_hand import RigidHand
@@ -34,11 +34,9 @@ _TYPES = {
 }
 
 
-def scene_xml(demonstration: Demonstration, hand: RigidHand | Body) -> str:
-    """The scene, with the native engine's solver, in one file."""
-    spec = scene_spec(
-        hand, demonstration.object, demonstration.support, demonstration.support_position, base_rotation(demonstration)
-    )
+def scene_xml(demonstration: Demonstration, hand: RigidHand | Body, contacts: str = "object") -> str:
+    """The scene, with the native engine's solver, in one file; contacts as `envs.scene.scene_spec` has them."""
+    spec = demonstration_spec(demonstration, hand, contacts=contacts)
     (solved,) = gauss_seidel([spec.compile()])
     for name in _SOLVER:
         setattr(spec.option, name, getattr(solved.opt, name))

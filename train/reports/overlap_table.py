@@ -8,8 +8,8 @@ from envs.evaluation.overlap import DEEP, Overlap
 from mjx_hand.view.report import Table
 
 _NOTE = (
-    "The twin's hand meets the object alone: neither its fingers nor table and support stop it. Of all frames of all "
-    "demonstrations; of fingers beyond what their shapes overlap by at rest."
+    "Of all frames of all demonstrations; of fingers beyond what their shapes overlap by at rest. What the twin's hand "
+    "meets besides the object, and is stopped by, is `task.contacts`."
 )
 
 
