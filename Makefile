@@ -7,15 +7,17 @@ PIP_FLAGS := --quiet --disable-pip-version-check
 # A file's tests stay with one worker: they share hands and compiled functions. Of two workers, one takes all of
 # tests/train and the other all of tests/envs first (tests/conftest.py): each folder shares sets and a training.
 WORKERS ?= 2
+# The robot hand of results-robots: a description's name, or the path of one.
+HAND ?= allegro
 # The environment of the newest Python here, and the Warp that pyproject.toml names.
 NEWEST := .venv-newest
 WARP := $(shell sed -n 's/^warp = .*warp-lang==\([0-9.]*\).*/\1/p' pyproject.toml)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo results ablations test test-slow smoke lint format types docs bench lock clean
+.PHONY: help setup demo results results-robots ablations test test-slow smoke lint format types docs bench lock clean
 
 help:  ## list the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 setup: $(STAMP)  ## make .venv with the locked packages (again only when they change)
 
@@ -44,6 +46,9 @@ demo: $(STAMP)  ## retarget a recording, train a pinch policy, write a report wi
 
 results: $(STAMP)  ## train and evaluate the five grasp types, three seeds each, on one page (hours; goes on where it stopped)
 	$(BIN)/python -m train.results
+
+results-robots: $(STAMP)  ## the same five types on a robot hand: make results-robots HAND=allegro (hours; goes on)
+	$(BIN)/python -m train.results hand=$(HAND) results=outputs/results-$(HAND)
 
 ablations: $(STAMP)  ## what each part of the method is worth: variants at equal budgets, three seeds, on one page (hours; goes on)
 	$(BIN)/python -m train.ablations

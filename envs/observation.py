@@ -13,11 +13,11 @@ from envs.task import Task
 from mjx_hand.bodies.body import Body
 from mjx_hand.objects.description import OBJECT_KINDS
 from mjx_hand.player.features import (
-    HUMAN,
+    HUMAN_NAMES,
     OBSERVATION_LIMIT,
     Feature,
     HandNames,
-    Seen,
+    ObservedState,
     feature_table,
     offsets_and_scales,
 )
@@ -32,7 +32,7 @@ def wrist_rotation(turns: Float[Array, "3"], base: Float[Array, "3 3"]) -> Float
     return base @ x @ y @ z
 
 
-def residual_scale(task: Task, hand: HandNames = HUMAN, reach: float = 1.0) -> Float[np.ndarray, "u"]:
+def residual_scale(task: Task, hand: HandNames = HUMAN_NAMES, reach: float = 1.0) -> Float[np.ndarray, "u"]:
     """What a residual of 1 is worth for each target (m, rad), of a hand with this `Body.reach`."""
     return np.concatenate(
         [
@@ -43,7 +43,7 @@ def residual_scale(task: Task, hand: HandNames = HUMAN, reach: float = 1.0) -> F
     )
 
 
-def observed_features(task: Task, hand: HandNames = HUMAN, reach: float = 1.0) -> tuple[Feature, ...]:
+def observed_features(task: Task, hand: HandNames = HUMAN_NAMES, reach: float = 1.0) -> tuple[Feature, ...]:
     """What a policy of this task and hand sees, in order."""
     table = feature_table(residual_scale(task, hand, reach), task.lookahead, OBJECT_KINDS, hand)
     return table if task.observe_properties else tuple(feature for feature in table if feature.name not in _PROPERTIES)
@@ -76,7 +76,7 @@ def _seen(
     physics: PhysicsState,
     residual: Float[Array, "u"],
     displacement: Float[Array, "3"] | None,
-) -> Seen:
+) -> ObservedState:
     base, length = reference.base[demonstration], reference.length[demonstration]
     poses = reference.object_pose[demonstration]
     later = jnp.minimum(frame + jnp.array(task.lookahead), length - 1)
@@ -86,7 +86,7 @@ def _seen(
         targets = targets + jax.vmap(lambda k: followed_target(reference, demonstration, k, displacement))(frames)
     hand, first = body.of_targets(physics.qpos), body.num_coordinates
     object_pose = physics.qpos[first:]
-    return Seen(
+    return ObservedState(
         hand=hand,
         hand_speed=body.of_targets(physics.qvel),
         residual=residual,

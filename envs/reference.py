@@ -76,7 +76,7 @@ def make_reference(
         InputError: none given, several rates or sides, or no force for a demonstration whose grasp is no type.
     """
     _check(demonstrations)
-    forces = _grip_forces(demonstrations, grip_force)
+    forces = grip_forces(demonstrations, grip_force)
     frames = max(d.num_frames for d in demonstrations)
     targets, poses, bases, approach = [], [], [], []
     for d in demonstrations:
@@ -213,7 +213,7 @@ def _grips(
     return offsets(angles, rotation, position, stack_hands(hands), sizes, planes, jnp.asarray(forces, jnp.float32))
 
 
-def _grip_forces(demonstrations: Sequence[Demonstration], grip_force: float | None) -> Float[np.ndarray, "d"]:
+def grip_forces(demonstrations: Sequence[Demonstration], grip_force: float | None) -> Float[np.ndarray, "d"]:
     """The force (N) of each demonstration's grip."""
     if grip_force is not None:
         return np.full(len(demonstrations), grip_force)

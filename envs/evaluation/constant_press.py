@@ -17,7 +17,7 @@ from envs.evaluation.evaluate import evaluate_in
 from envs.evaluation.roll_out import make_roll_out, zero_residual
 from envs.grasps import grasp_names, grasp_type
 from envs.grasps.grasp_type import Pads, Wrap, wrap_torque
-from envs.reference import grip_table
+from envs.reference import grip_forces, grip_table
 from envs.scene import NUM_WRIST
 from envs.tracking import TrackingEnv
 from envs.twin import Tables
@@ -26,7 +26,7 @@ from mjx_hand.motion.demonstration import Demonstration
 
 # What is tried, as shares of full strength: the force or torques that a type's demonstrations are made with.
 SHARES = (0.25, 0.375, 0.5, 2 / 3, 0.75, 1.0, 1.25, 1.5, 2.0)
-_UNKNOWN_FULL = 4.0  # full strength of demonstrations of no type, as a multiple of the reference's force
+_UNKNOWN_FULL = 4.0  # full strength where no type says it, as a multiple of the reference's force
 _RAMP = 0.6  # s before the object first moves, in which a wrap closes
 _MOVED, _TURNED = 0.002, np.deg2rad(2.0)  # m, rad from its first pose
 _JUDGED_BY = ("chord", "hold", "manip_trans_object")
@@ -73,12 +73,14 @@ class ConstantPress:
 
 def constant_press(env: TrackingEnv) -> ConstantPress:
     """What presses the demonstrations of an environment."""
-    full = {d.grasp: _full(d, env) for d in env.demonstrations}
-    forces = np.array([np.nan if (force := full[d.grasp]) is None else force for d in env.demonstrations])
+    forces = grip_forces(env.demonstrations, env.task.grip_force)
+    of_grasp = {d.grasp: forces[[d.grasp == other.grasp for other in env.demonstrations]] for d in env.demonstrations}
+    full = {d.grasp: _full(d, env, float(np.median(of_grasp[d.grasp]))) for d in env.demonstrations}
+    pressing = np.array([np.nan if (force := full[d.grasp]) is None else force for d in env.demonstrations])
     # The grip is an offset to the surface and torques in proportion to the force, which 1 N leaves within all limits.
     given = env.demonstrations, env.hands, env.reference.targets
-    contact, one = (grip_table(*given, np.where(forces >= 0, force, np.nan), env.gains) for force in (0.0, 1.0))
-    press = np.array((one - contact) * np.nan_to_num(forces)[:, None, None])
+    contact, one = (grip_table(*given, np.where(pressing >= 0, force, np.nan), env.gains) for force in (0.0, 1.0))
+    press = np.array((one - contact) * np.nan_to_num(pressing)[:, None, None])
     for k, d in enumerate(env.demonstrations):
         if full[d.grasp] is None:
             closing = grasp_type(d.grasp).closing
@@ -118,15 +120,16 @@ def search_press(env: TrackingEnv, hold: float) -> dict[str, float]:
     }
 
 
-def _full(demonstration: Demonstration, env: TrackingEnv) -> float | None:
-    """Newtons of full strength, or None where the demonstration's type wraps."""
-    if demonstration.grasp not in grasp_names():
-        return _UNKNOWN_FULL * (env.task.grip_force or 1.0)
-    closing = grasp_type(demonstration.grasp).closing
-    if isinstance(closing, Pads):
-        return closing.force
-    # The torques of a wrap are those of human hinges; another hand presses with a force on every link that touches.
-    return None if env.body.rigid is not None else _UNKNOWN_FULL * (env.task.grip_force or 1.0)
+def _full(demonstration: Demonstration, env: TrackingEnv, force: float) -> float | None:
+    """Newtons of full strength, or None where the demonstration's type wraps; `force` is the reference's own."""
+    if demonstration.grasp in grasp_names():
+        closing = grasp_type(demonstration.grasp).closing
+        if isinstance(closing, Pads):
+            return closing.force
+        if env.body.rigid is not None:
+            return None
+        # The torques of a wrap are those of human hinges; another hand presses with a force on every link that touches.
+    return _UNKNOWN_FULL * force
 
 
 def _ramp(demonstration: Demonstration, frames: int) -> Float[np.ndarray, "{frames}"]:

@@ -38,12 +38,12 @@ class HandNames:
         return (*WRIST, *self.joints)
 
 
-HUMAN = HandNames()
-TARGETS = HUMAN.targets
+HUMAN_NAMES = HandNames()
+TARGETS = HUMAN_NAMES.targets
 
 
 @dataclasses.dataclass(frozen=True)
-class Seen:
+class ObservedState:
     """A world at a frame of a demonstration, and the demonstration there; metres, radians, seconds, wxyz.
 
     Arrays of either kind. h is the number of frames that the policy sees ahead; past its end a demonstration's last
@@ -108,7 +108,7 @@ class Feature:
     unit: str
     frame: str
     elements: tuple[str, ...]
-    value: Callable[[Seen], Any]
+    value: Callable[[ObservedState], Any]
     scale: float | Sequence[float] | Float[np.ndarray, "n"] = 1.0
     offset: float | Sequence[float] = 0.0
 
@@ -122,7 +122,7 @@ def feature_table(
     residual_scale: Float[np.ndarray, "u"],
     lookahead: Sequence[int],
     object_kinds: Sequence[str],
-    hand: HandNames = HUMAN,
+    hand: HandNames = HUMAN_NAMES,
 ) -> tuple[Feature, ...]:
     """The features in the observation's order.
 
@@ -227,7 +227,7 @@ def _of_targets(
     targets: tuple[str, ...],
     name: str,
     meaning: str,
-    value: Callable[[Seen], Any],
+    value: Callable[[ObservedState], Any],
     scales: Sequence[float] | Float[np.ndarray, "u"],
     per: str = "",
 ) -> tuple[Feature, Feature, Feature]:

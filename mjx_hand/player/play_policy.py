@@ -11,7 +11,7 @@ from jaxtyping import Float
 from mjx_hand.errors import InputError
 from mjx_hand.player.approach import approach_weights, displacement, followed
 from mjx_hand.player.exported_policy import ExportedPolicy, load_exported_policy
-from mjx_hand.player.features import WRIST, Feature, HandNames, Seen, feature_table
+from mjx_hand.player.features import WRIST, Feature, HandNames, ObservedState, feature_table
 from mjx_hand.player.tracking_reference import TrackingReference, load_tracking_reference
 
 _FREE = 7  # coordinates of the object, the last of a scene's; of its speed one less
@@ -128,12 +128,12 @@ class Player:
         reference, moved = self.reference, self.displacement * self._weights[frame]
         return followed(reference.targets[frame].astype(float), reference.base, reference.object_pose[0, :3], moved, np)
 
-    def _seen(self) -> Seen:
+    def _seen(self) -> ObservedState:
         reference, data, frame = self.reference, self.data, self.frame
         mujoco.mj_kinematics(self.model, data)  # places follow the state; mj_step leaves them a step behind
         later = np.minimum(frame + self._lookahead, reference.num_frames - 1)
         pose = data.qpos[-_FREE:]
-        return Seen(
+        return ObservedState(
             hand=data.qpos[self._qpos],
             hand_speed=data.qvel[self._qvel],
             residual=self.residual,

@@ -15,7 +15,7 @@ from envs.evaluation.rollout import Rollouts
 from envs.tracking import TrackingEnv
 from envs.twin import Tables
 from mjx_hand.errors import InputError
-from mjx_hand.player.features import HUMAN
+from mjx_hand.player.features import HUMAN_NAMES
 from train.learning.checkpoint import Checkpoint, load_checkpoint
 from train.learning.policy import check_policy, deterministic_policy
 from train.learning.run_folder import BEST
@@ -80,7 +80,7 @@ def settled(config: Config, given: Collection[str]) -> Config:
     return config
 
 
-def chosen_checkpoint(config: Config, observation_size: int, action_size: int = len(HUMAN.targets)) -> Checkpoint:
+def chosen_checkpoint(config: Config, observation_size: int, action_size: int = len(HUMAN_NAMES.targets)) -> Checkpoint:
     """The checkpoint of `chosen_path`, if it is of this experiment's task, demonstrations and network.
 
     Raises:

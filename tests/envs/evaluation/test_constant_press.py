@@ -37,6 +37,19 @@ def test_pads_press_with_the_reference_s_own_grip(env, press, demonstrations, ha
     assert press.described({"pinch": 0.75}) == {"pinch": f"{0.75 * PINCH.closing.force:.3g} N"}
 
 
+def test_recordings_are_pressed_as_hard_as_their_weight_asks_for(env):
+    """No grasp type says how hard. The grid must reach what carries them, or the baseline beside a policy is weak."""
+    other = env.with_tables(env.tables)
+    other.demonstrations = tuple(replace(d, grasp="recorded") for d in env.demonstrations)
+    weights = [9.81 * d.object.mass / d.object.friction for d in env.demonstrations]
+    assert env.task.grip_force is None
+    pressed = constant_press(other)
+    assert pressed.full["recorded"] == pytest.approx(4 * np.median(weights))
+    assert max(module.SHARES) * pressed.full["recorded"] > 4.5 * max(weights)
+    held = np.asarray(pressed.press).any(axis=(1, 2))
+    assert held.all()
+
+
 def test_wraps_close_before_the_object_moves(env, press):
     """A demonstration that is said to be a power grasp: its torques, from none to all in 0.6 s, within the limits."""
     closing = grasp_type("power").closing

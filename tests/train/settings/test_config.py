@@ -204,3 +204,16 @@ def test_hydras_own_flags_show_the_configuration(tmp_path):
     assert "name: pinch_demo\n" in done.stdout
     assert "seed: 7\n" in done.stdout
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("overrides", "folder"),
+    [
+        (["config=power"], "outputs/power/seed0"),
+        (["config=power", "hand=human"], "outputs/power/seed0"),
+        (["config=power", "hand=allegro", "seed=2"], "outputs/power-allegro/seed2"),
+        (["hand=allegro", "out=here"], "here"),
+    ],
+)
+def test_a_robot_hand_has_a_results_folder_of_its_own(overrides, folder):
+    assert compose(overrides).out == folder
