@@ -66,26 +66,26 @@ def meet_itself(spec: mujoco.MjSpec, contacts: str, coarse: bool) -> None:
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     geoms = [g for g in range(model.ngeom) if model.geom_contype[g]]
-    for one, other in [*finger_pairs(model, geoms), *_palm_pairs(model, geoms)]:
+    for one, other in [*_finger_pairs(model, geoms), *_palm_pairs(model, geoms)]:
         if not coarse or mujoco.mj_geomDistance(model, data, one, other, 0.001, None) > 0:
             names = {"geomname1": model.geom(one).name, "geomname2": model.geom(other).name}
             spec.add_pair(**names, condim=1, solref=SOLREF)
 
 
-def finger_pairs(model: mujoco.MjModel, geoms: Sequence[int]) -> list[tuple[int, int]]:
+def _finger_pairs(model: mujoco.MjModel, geoms: Sequence[int]) -> list[tuple[int, int]]:
     """Pairs of a hand's geoms that belong to two fingers."""
-    lines = {g: line for g, line in _below_palm(model, geoms).items() if line}
+    lines = {g: line for g, line in below_palm(model, geoms).items() if line}
     return [(a, b) for a, b in itertools.combinations(lines, 2) if lines[a][0] != lines[b][0]]
 
 
 def _palm_pairs(model: mujoco.MjModel, geoms: Sequence[int]) -> list[tuple[int, int]]:
     """Pairs of the palm's geoms and those of links that are at least two links below it."""
-    lines = _below_palm(model, geoms)
+    lines = below_palm(model, geoms)
     palm = [g for g, line in lines.items() if not line]
     return [(a, b) for a in palm for b, line in lines.items() if len(line) > 1]
 
 
-def _below_palm(model: mujoco.MjModel, geoms: Sequence[int]) -> dict[int, list[int]]:
+def below_palm(model: mujoco.MjModel, geoms: Sequence[int]) -> dict[int, list[int]]:
     """For each of a hand's geoms the bodies from its finger's first to its own; none of the palm's."""
     lines = {g: _line(model, int(model.geom_bodyid[g])) for g in geoms}
     palm = len(list(itertools.takewhile(lambda level: len(set(level)) == 1, zip(*lines.values(), strict=False))))

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from envs.grasps import grasp_names, grasp_type
 from envs.grip import grip_offsets
-from envs.grip_force import RECORDED, grip_force_of
+from envs.grip_force import RECORDED, closing_ramp, grip_force_of
 from envs.model_grip import model_grips
 from envs.scene import NUM_WRIST, base_rotation, wrist_coordinates
 from mjx_hand.bodies.body import Body
@@ -27,6 +27,8 @@ from mjx_hand.player.approach import approach_weights
 from mjx_hand.pytree import pytree
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand, finger_tips, stack_hands, without_meshes
+
+RECORDED_RAMP = 0.3  # s before a recorded object first moves, in which the grip sets in
 
 
 @pytree
@@ -120,7 +122,7 @@ def cached_reference(
         return {field.name: np.asarray(getattr(made, field.name)) for field in dataclasses.fields(made)}
 
     bare = [_ingredient(hand) for hand in hands]
-    arrays = cached(compute, list(demonstrations), bare, grip_force, dataclasses.astuple(gains))
+    arrays = cached(compute, list(demonstrations), bare, grip_force, dataclasses.astuple(gains), RECORDED_RAMP)
     return Reference(**{name: jnp.asarray(array) for name, array in arrays.items()})
 
 
@@ -131,11 +133,31 @@ def grip_table(
     forces: Float[np.ndarray, "d"],
     gains: Gains,
 ) -> Float[Array, "d t u"]:
-    """The grip (m, rad) of each demonstration at a force (N); NaN leaves it as it is."""
-    people = _people(hands)
+    """The grip (m, rad) of each demonstration at a force (N); NaN leaves it as it is.
+
+    A recorded hand that reaches along an object would knock it over if it pressed on it: there the grip begins
+    shortly before the object moves. In demonstrations of grasp types open fingers stay off the object.
+    """
+    people, frames = _people(hands), targets.shape[1]
     if people is None:
         bodies = [body_of(hand) for hand in hands]
-        return jnp.asarray(model_grips(demonstrations, bodies, np.asarray(targets, float), forces, gains), jnp.float32)
+        told = model_grips(demonstrations, bodies, np.asarray(targets, float), forces, gains)
+        grip = jnp.asarray(told, jnp.float32)
+    else:
+        grip = _grips_of_people(demonstrations, people, targets, forces, gains)
+    for k, d in enumerate(demonstrations):
+        if d.grasp == RECORDED:
+            grip = grip.at[k].multiply(closing_ramp(d, frames, RECORDED_RAMP)[:, None])
+    return grip
+
+
+def _grips_of_people(
+    demonstrations: Sequence[Demonstration],
+    people: Sequence[RigidHand],
+    targets: Float[Array, "d t u"],
+    forces: Float[np.ndarray, "d"],
+    gains: Gains,
+) -> Float[Array, "d t u"]:
     frames = targets.shape[1]
     relative = [[padded(rows, frames) for rows in object_in_hand(d)] for d in demonstrations]
     rotation = jnp.asarray(np.stack([r for r, _ in relative]), jnp.float32)

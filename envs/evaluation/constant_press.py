@@ -11,12 +11,12 @@ from collections.abc import Mapping
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
-from scipy.spatial.transform import Rotation
 
 from envs.evaluation.evaluate import evaluate_in
 from envs.evaluation.roll_out import make_roll_out, zero_residual
 from envs.grasps import grasp_names, grasp_type
 from envs.grasps.grasp_type import Pads, Wrap, wrap_torque
+from envs.grip_force import closing_ramp
 from envs.reference import grip_forces, grip_table
 from envs.scene import NUM_WRIST
 from envs.tracking import TrackingEnv
@@ -28,7 +28,6 @@ from mjx_hand.motion.demonstration import Demonstration
 SHARES = (0.25, 0.375, 0.5, 2 / 3, 0.75, 1.0, 1.25, 1.5, 2.0)
 _UNKNOWN_FULL = 4.0  # full strength where no type says it, as a multiple of the reference's force
 _RAMP = 0.6  # s before the object first moves, in which a wrap closes
-_MOVED, _TURNED = 0.002, np.deg2rad(2.0)  # m, rad from its first pose
 _JUDGED_BY = ("chord", "hold", "manip_trans_object")
 
 
@@ -85,7 +84,7 @@ def constant_press(env: TrackingEnv) -> ConstantPress:
         if full[d.grasp] is None:
             closing = grasp_type(d.grasp).closing
             assert isinstance(closing, Wrap)
-            ramp = _ramp(d, press.shape[1])
+            ramp = closing_ramp(d, press.shape[1], _RAMP)
             press[k, :, NUM_WRIST:] = ramp[:, None] * wrap_torque(closing) / env.gains.stiffness
     return ConstantPress(env, full, contact, jnp.asarray(press, jnp.float32))
 
@@ -130,14 +129,3 @@ def _full(demonstration: Demonstration, env: TrackingEnv, force: float) -> float
             return None
         # The torques of a wrap are those of human hinges; another hand presses with a force on every link that touches.
     return _UNKNOWN_FULL * force
-
-
-def _ramp(demonstration: Demonstration, frames: int) -> Float[np.ndarray, "{frames}"]:
-    """From 0 to 1 in the time before the object first moves, and 1 from then on."""
-    pose = demonstration.object_pose
-    turned = Rotation.from_quat(pose[:, 3:], scalar_first=True)
-    away = np.linalg.norm(pose[:, :3] - pose[0, :3], axis=1) > _MOVED
-    moves = away | ((turned * turned[0].inv()).magnitude() > _TURNED)
-    first = int(np.argmax(moves)) if moves.any() else len(pose)
-    length = max(round(_RAMP * demonstration.motion.fps), 1)
-    return np.clip((np.arange(frames) - (first - length)) / length, 0.0, 1.0)

@@ -3,15 +3,15 @@
 Where the hand meets the object alone (`Task.contacts`), nothing but the policy keeps it out of itself and the ground.
 """
 
-import itertools
+import copy
 from collections.abc import Sequence
 
 import mujoco
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from envs.evaluation.rollout import Rollouts
-from envs.hand_contacts import finger_pairs
+from envs.hand_contacts import below_palm
 from envs.scene import OBJECT, SPARE
 from mjx_hand.pytree import pytree
 
@@ -42,31 +42,51 @@ def hand_overlap(rollouts: Rollouts, models: Sequence[mujoco.MjModel]) -> Overla
     """
     fingers, ground = np.zeros(rollouts.counted.shape), np.zeros(rollouts.counted.shape)
     for row, which in enumerate(rollouts.demonstration):
-        model = models[which]
-        data, pairs = mujoco.MjData(model), _pairs(model)
-        between = np.concatenate(pairs)
-        mujoco.mj_kinematics(model, data)
-        rest = _depths(model, data, pairs[0])
+        model, still = _all_meeting(models[which])
+        data = mujoco.MjData(model)
+        rest = _depths(model, data)
         for frame in np.flatnonzero(rollouts.counted[row]):
             data.qpos[:] = rollouts.qpos[row, frame]
-            mujoco.mj_kinematics(model, data)
-            depths = _depths(model, data, between)
-            fingers[row, frame] = max(0.0, (depths[: len(rest)] - rest).max(initial=0.0))
-            ground[row, frame] = depths[len(rest) :].max(initial=0.0)
+            for pair, depth in _depths(model, data).items():
+                if still.isdisjoint(pair):
+                    fingers[row, frame] = max(fingers[row, frame], depth - rest.get(pair, 0.0))
+                else:
+                    ground[row, frame] = max(ground[row, frame], depth)
     return Overlap(counted=rollouts.counted, fingers=fingers, ground=ground)
 
 
-def _pairs(model: mujoco.MjModel) -> tuple[Int[np.ndarray, "f 2"], Int[np.ndarray, "g 2"]]:
-    """Geoms of two fingers each, and of the hand and what stands still."""
-    hand_root = model.body_rootid[model.jnt_bodyid[model.actuator_trnid[0, 0]]]
-    solid = model.geom_contype > 0
-    hand = [g for g in np.flatnonzero(solid) if model.body_rootid[model.geom_bodyid[g]] == hand_root]
+def _all_meeting(model: mujoco.MjModel) -> tuple[mujoco.MjModel, set[int]]:
+    """A copy of the model in which two fingers, and the hand and what stands still, meet, and nothing else does.
+
+    The C engine then finds overlaps many times quicker than pair by pair. Also returns the geoms that stand still.
+    """
+    root = model.body_rootid[model.jnt_bodyid[model.actuator_trnid[0, 0]]]
+    solid = np.flatnonzero(model.geom_contype > 0)
+    hand = [int(g) for g in solid if model.body_rootid[model.geom_bodyid[g]] == root]
     fixed = np.flatnonzero((model.body_weldid[model.geom_bodyid] == 0) & (model.geom_conaffinity > 0))
-    named = [g for g in fixed if not model.geom(g).name.startswith((SPARE, OBJECT))]
-    ground = list(itertools.product(hand, named))
-    return np.array(finger_pairs(model, hand), int).reshape(-1, 2), np.array(ground, int).reshape(-1, 2)
+    still = {int(g) for g in fixed if not model.geom(g).name.startswith((SPARE, OBJECT))}
+    lines = below_palm(model, hand)
+    fingers = list(dict.fromkeys(line[0] for line in lines.values() if line))
+    every = 2 * (2 ** len(fingers) - 1)  # a bit for each finger, and bit 0 for the hand on what stands still
+    met = copy.copy(model)
+    met.geom_contype[:], met.geom_conaffinity[:] = 0, 0
+    for g, line in lines.items():
+        own = 2 << fingers.index(line[0]) if line else 0
+        met.geom_contype[g], met.geom_conaffinity[g] = own | 1, (every & ~own) if line else 0
+    met.geom_conaffinity[list(still)] = 1
+    for body in range(met.nbody):  # what MuJoCo looks at first
+        own = slice(met.body_geomadr[body], met.body_geomadr[body] + met.body_geomnum[body])
+        met.body_contype[body] = np.bitwise_or.reduce(met.geom_contype[own])
+        met.body_conaffinity[body] = np.bitwise_or.reduce(met.geom_conaffinity[own])
+    return met, still
 
 
-def _depths(model: mujoco.MjModel, data: mujoco.MjData, pairs: Int[np.ndarray, "p 2"]) -> Float[np.ndarray, "p"]:
-    """How deep (m) each pair of geoms overlaps, 0 where apart."""
-    return np.array([max(0.0, -mujoco.mj_geomDistance(model, data, *pair, 0.001, None)) for pair in pairs.tolist()])
+def _depths(model: mujoco.MjModel, data: mujoco.MjData) -> dict[tuple[int, int], float]:
+    """How deep (m) pairs of geoms overlap at the data's coordinates, those that do."""
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_collision(model, data)
+    deepest: dict[tuple[int, int], float] = {}
+    for (one, other), distance in zip(data.contact.geom.tolist(), data.contact.dist.tolist(), strict=True):
+        pair = (min(one, other), max(one, other))
+        deepest[pair] = max(deepest.get(pair, 0.0), -distance)
+    return deepest

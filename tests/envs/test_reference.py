@@ -141,3 +141,23 @@ def test_demonstrations_that_do_not_belong_together_are_refused(demonstrations, 
         made(replace(d, motion=replace(d.motion, side="left")))
     with pytest.raises(InputError, match="no demonstrations given"):
         make_reference([], [], grip_force=0.0, gains=Gains())
+
+
+def test_a_recorded_hand_presses_only_when_the_object_is_about_to_move(demonstrations, hands):
+    """Reaching along an object it would knock it over; from the first movement on it presses as a type's does."""
+    usual = np.asarray(make_reference(demonstrations, hands, grip_force=2.0, gains=Gains()).grip)
+    given = [replace(d, grasp="recorded") for d in demonstrations]
+    found = np.asarray(make_reference(given, hands, grip_force=2.0, gains=Gains()).grip)
+    assert usual.any()
+    for k, d in enumerate(demonstrations):
+        away = np.linalg.norm(d.object_pose[:, :3] - d.object_pose[0, :3], axis=1) > 0.002
+        cosine = np.abs(d.object_pose[:, 3:] @ d.object_pose[0, 3:])
+        first = int(np.argmax(away | (2 * np.arccos(np.minimum(cosine, 1.0)) > np.deg2rad(2.0))))
+        begin = first - round(0.3 * d.motion.fps)
+        assert begin > 0
+        assert usual[k, begin].any()  # or there is nothing to leave out
+        np.testing.assert_array_equal(found[k, : begin + 1], 0.0)
+        np.testing.assert_allclose(found[k, first:], usual[k, first:], rtol=1e-6)
+        half = (begin + first) // 2
+        share = (half - begin) / (first - begin)
+        np.testing.assert_allclose(found[k, half], share * usual[k, half], rtol=1e-5, atol=1e-8)
