@@ -32,7 +32,7 @@ def test_every_experiment_composes(name):
 def test_experiments_change_what_their_file_says_and_the_command_line_wins():
     assert compose(["config=pinch_demo"]).data.people == 8
     config = compose(["config=pinch_demo", "data.people=2", "seed=5"])
-    assert (config.data.people, config.data.trials, config.seed) == (2, 4, 5)
+    assert (config.data.people, config.data.trials, config.seed) == (2, 3, 5)
     assert config.out == "outputs/pinch_demo/seed5"
 
 
