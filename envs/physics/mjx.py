@@ -23,7 +23,15 @@ def make(models: Sequence[mujoco.MjModel], substeps: int) -> "MjxEngine":
 
     Pyramidal cones with fewer iterations (impratio 3, 6 and 8) are four times as quick and another physics: the same
     replays from mid-grasp hold 11 of 64 objects, not 56. Elliptic ones with 6 and 8 throw them metres away.
+
+    Raises:
+        InputError: contacts without friction, which MJX has not with elliptic cones.
     """
+    if any((model.pair_dim == 1).any() for model in models):
+        raise InputError(
+            "engine 'mjx' cannot let the hand meet itself (task.contacts=self or all): it has no contacts without "
+            "friction; use engine 'native' or 'warp', or task.contacts=ground"
+        )
     return MjxEngine(newton(models), substeps)
 
 

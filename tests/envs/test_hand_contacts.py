@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from envs.hand_contacts import CONTACTS
+from envs.physics import make_engine
 from envs.scene import OBJECT, SUPPORT, TABLE, scene_spec
 from envs.task import Task
 from envs.tracking import TrackingEnv
@@ -127,6 +128,11 @@ def test_environments_have_what_the_task_says(demonstrations, hands):
         env = TrackingEnv(demonstrations[:1], hands[:1], "native", Task(contacts=contacts))
         assert [model.npair for model in env.models] == [pairs]
         assert env.engine.models[0].npair == pairs
+
+
+def test_mjx_refuses_contacts_that_it_does_not_have():
+    with pytest.raises(InputError, match=r"'mjx' cannot let the hand meet itself .* use engine 'native' or 'warp'"):
+        make_engine("mjx", [scene("all")], 5)
 
 
 def test_what_is_no_choice_is_refused():
