@@ -145,10 +145,9 @@ def grip_table(
         grip = jnp.asarray(told, jnp.float32)
     else:
         grip = _grips_of_people(demonstrations, people, targets, forces, gains)
-    for k, d in enumerate(demonstrations):
-        if d.grasp == RECORDED:
-            grip = grip.at[k].multiply(closing_ramp(d, frames, RECORDED_RAMP)[:, None])
-    return grip
+    whole = np.ones(frames)
+    ramps = [closing_ramp(d, frames, RECORDED_RAMP) if d.grasp == RECORDED else whole for d in demonstrations]
+    return grip * jnp.asarray(np.stack(ramps), jnp.float32)[..., None]
 
 
 def _grips_of_people(

@@ -73,8 +73,8 @@ class ConstantPress:
 def constant_press(env: TrackingEnv) -> ConstantPress:
     """What presses the demonstrations of an environment."""
     forces = grip_forces(env.demonstrations, env.task.grip_force)
-    of_grasp = {d.grasp: forces[[d.grasp == other.grasp for other in env.demonstrations]] for d in env.demonstrations}
-    full = {d.grasp: _full(d, env, float(np.median(of_grasp[d.grasp]))) for d in env.demonstrations}
+    grasps = np.array([d.grasp for d in env.demonstrations])
+    full = {d.grasp: _full(d, env, float(np.median(forces[grasps == d.grasp]))) for d in env.demonstrations}
     pressing = np.array([np.nan if (force := full[d.grasp]) is None else force for d in env.demonstrations])
     # The grip is an offset to the surface and torques in proportion to the force, which 1 N leaves within all limits.
     given = env.demonstrations, env.hands, env.reference.targets

@@ -6,6 +6,7 @@ import difflib
 import io
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import hydra
@@ -30,6 +31,9 @@ from train.settings.overrides import completed, old_names, options_given
 
 _SEEDS = 2**31  # JAX's keys are made of 32 bits, with a sign
 Settled = Callable[["Config", Sequence[str]], "Config"]
+
+# In `out`: a robot hand's results go to a folder of their own, in sweeps over hands too.
+OmegaConf.register_new_resolver("of_robot", lambda hand: "" if hand == HUMAN else f"-{Path(hand).stem}", replace=True)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,7 +70,7 @@ class Config:
     device: str = "cpu"
     seed: int = 0
     seeds: tuple[int, ...] = ()
-    out: str = "outputs/${name}/seed${seed}"
+    out: str = "outputs/${name}${of_robot:${hand}}/seed${seed}"
     demonstrations: str = "outputs/demonstrations"
     checkpoint: str = ""
     part: str = "heldout"

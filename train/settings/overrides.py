@@ -1,10 +1,8 @@
 """What a few command-line overrides stand for, before Hydra composes them."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from envs.demonstrations.set_settings import GIVEN
-from mjx_hand.bodies.human_body import HUMAN
 from mjx_hand.errors import InputError
 from train.settings.device import with_device
 
@@ -25,15 +23,14 @@ RENAMED = {
 
 
 def completed(overrides: Sequence[str]) -> list[str]:
-    """The overrides, flags of Hydra's among them, with a device, the experiment that `data.folder` stands for, and a
-    robot hand's own folder for results.
+    """The overrides, flags of Hydra's among them, with a device and with the experiment that `data.folder` stands for.
 
     Options by the names that they had once have their present ones.
 
     Raises:
         InputError: as `with_device` and `with_folder`.
     """
-    return with_device(with_hand(with_folder([_with_new_name(override) for override in overrides])))
+    return with_device(with_folder([_with_new_name(override) for override in overrides]))
 
 
 def options_given(overrides: Sequence[str]) -> list[str]:
@@ -61,7 +58,7 @@ def with_folder(overrides: Sequence[str]) -> list[str]:
     Raises:
         InputError: beside the folder, an experiment or an option of `data`, which is for sets that are made.
     """
-    options = [(o.lstrip("+~").partition("=")[0], o) for o in overrides if not o.startswith("-")]
+    options = [(_option(o), o) for o in overrides if not o.startswith("-")]
     if _FOLDER not in dict(options):
         return list(overrides)
     chosen = f"config={GIVEN}"
@@ -74,12 +71,3 @@ def with_folder(overrides: Sequence[str]) -> list[str]:
     others = [override for override in overrides if override != chosen]
     place = next(k for k, o in enumerate(others) if o.lstrip("+~").startswith(f"{_FOLDER}="))
     return [*others[:place], chosen, *others[place:]]
-
-
-def with_hand(overrides: Sequence[str]) -> list[str]:
-    """The overrides, with a folder of its own for a robot hand's results where `out` is not given."""
-    options = {_option(o): o.partition("=")[2].strip(" '\"") for o in overrides if not o.startswith("-")}
-    hand = options.get("hand", HUMAN)
-    if hand == HUMAN or "out" in options:
-        return list(overrides)
-    return [*overrides, f"out=outputs/${{name}}-{Path(hand).stem}/seed${{seed}}"]

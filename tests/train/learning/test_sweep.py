@@ -33,6 +33,18 @@ def overrides(tmp_path: Path, launcher: str, *ours: str) -> list[str]:
     return [out, f"hydra.sweep.dir={tmp_path}/sweep", f"hydra/launcher={launcher}", *limits.get(launcher, []), *ours]
 
 
+def test_each_hand_of_a_sweep_has_a_folder_of_its_own(tmp_path: Path):
+    """As many jobs are launched as there are hands, and each is given the folder that was checked beforehand."""
+    given = [o for o in overrides(tmp_path, "basic", "hand=human,allegro") if not o.startswith("out=")]
+    assert [c.out for c in combinations(given)] == ["outputs/pinch/seed0", "outputs/pinch-allegro/seed0"]
+    launched = [outcome.config for outcome in module._launched(module._Job(__name__, "silent"), given)]
+    assert [(c.hand, c.out) for c in launched] == [(c.hand, c.out) for c in combinations(given)]
+
+
+def silent(config: Config) -> Mapping[str, object] | None:
+    """Stands for a training that writes nothing."""
+
+
 def test_all_combinations_in_order():
     configs = combinations(["config=pinch,power", "seed=0,1,2", "ppo.num_envs=8", "hydra/launcher=joblib"])
     assert [(c.name, c.seed) for c in configs] == [(n, s) for n in ("pinch", "power") for s in (0, 1, 2)]
