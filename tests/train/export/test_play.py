@@ -91,7 +91,9 @@ def test_the_example_reproduces_the_rollout(exported: Path, own: tuple[Rollouts,
     said = run(EXAMPLE, exported, tmp_path / "played.npz", example)
     path = np.load(tmp_path / "played.npz")["path"]
     assert np.linalg.norm(path[:, :3] - own[0].object_pose[0, :, :3], axis=1).max() < 1e-3
-    assert said.startswith("demonstrations/000.npz: followed, off by 0.")
+    assert said.startswith("demonstrations/000.npz: followed, off by ")
+    told = float(said.split("off by ")[1].split(" cm")[0])
+    assert told == pytest.approx(own[1].scores["tracking_error_cm"][0], abs=0.02)
 
 
 def differing(a: mujoco.MjModel, b: mujoco.MjModel) -> list[str]:
