@@ -1,9 +1,11 @@
 """How hard a hand must press to carry an object that no grasp type says anything about, and from when on."""
 
+import mujoco
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
+from envs.scene import OBJECT
 from mjx_hand.motion.demonstration import Demonstration
 
 RECORDED = "recorded"  # what a demonstration that is of no grasp type calls its grasp
@@ -17,6 +19,15 @@ def grip_force_of(mass: float, friction: float, share: float = 1.0) -> float:
     Both sides of a grip bear: 2 F μ = m g would just hold.
     """
     return share * mass * _GRAVITY / friction
+
+
+def least_contact_force(model: mujoco.MjModel) -> float:
+    """The least sum of the sizes of contact forces (N) that carries a scene's object by its upright faces.
+
+    A contact's normal force N bears μ N, so that m g needs N = m g / μ of all together, of the size N sqrt(1 + μ²).
+    """
+    friction = model.geom_friction[model.geom_bodyid == model.body(OBJECT).id, 0].max()
+    return float(model.body(OBJECT).mass[0] * _GRAVITY * np.hypot(1.0, friction) / friction)
 
 
 def closing_ramp(demonstration: Demonstration, frames: int, seconds: float) -> Float[np.ndarray, "{frames}"]:

@@ -13,6 +13,7 @@ from envs.task import Task
 from mjx_hand.bodies.body import Body
 from mjx_hand.objects.description import OBJECT_KINDS
 from mjx_hand.player.features import (
+    CONTACT_FORCES,
     HUMAN_NAMES,
     OBSERVATION_LIMIT,
     Feature,
@@ -46,7 +47,9 @@ def residual_scale(task: Task, hand: HandNames = HUMAN_NAMES, reach: float = 1.0
 def observed_features(task: Task, hand: HandNames = HUMAN_NAMES, reach: float = 1.0) -> tuple[Feature, ...]:
     """What a policy of this task and hand sees, in order."""
     table = feature_table(residual_scale(task, hand, reach), task.lookahead, OBJECT_KINDS, hand)
-    return table if task.observe_properties else tuple(feature for feature in table if feature.name not in _PROPERTIES)
+    unseen = {name for name in _PROPERTIES if not task.observe_properties}
+    unseen |= {CONTACT_FORCES} if not task.observe_forces else set()
+    return tuple(feature for feature in table if feature.name not in unseen)
 
 
 def observe(
@@ -97,6 +100,7 @@ def _seen(
         wrist_place=base @ hand[:3],
         wrist_axes=wrist_rotation(hand[3:NUM_WRIST], base),
         tips=physics.sensordata.reshape(-1, 3),
+        forces=physics.contact[:, :3],
         base=base,
         target=targets[0],
         grip=reference.grip[demonstration, frame],

@@ -26,6 +26,8 @@ class TrackedStep:
         tips, tips_reference: finger tips in the world (m), in the order of the hand's fingers.
         action: what the policy did, from -1 to 1.
         change: of the filtered action, residual over its scale, since the step before.
+        forces: what each link presses the object with (N, world).
+        needed: the least sum of their sizes (N) that carries the object by upright faces.
     """
 
     position: Float[Array, ""]
@@ -38,6 +40,8 @@ class TrackedStep:
     tips_reference: Float[Array, "tips 3"]
     action: Float[Array, "u"]
     change: Float[Array, "u"]
+    forces: Float[Array, "links 3"]
+    needed: Float[Array, ""]
 
 
 Value = Callable[[TrackedStep], Float[Array, ""]]
@@ -104,6 +108,13 @@ def tips(step: TrackedStep) -> Float[Array, ""]:
 def action_rate(step: TrackedStep) -> Float[Array, ""]:
     """|c|^2 of the filtered action's change c in a step, so that what is commanded is smooth."""
     return jnp.sum(step.change**2)
+
+
+@cost(0.0)
+def grip_force(step: TrackedStep) -> Float[Array, ""]:
+    """By how much the links' forces on the object exceed what its weight needs, over that."""
+    total = jnp.sum(jnp.sqrt(jnp.sum(step.forces**2, axis=-1) + 1e-9))  # N^2, where the size has no derivative
+    return jnp.maximum(total / step.needed - 1.0, 0.0)
 
 
 def _check_weights(weights: "RewardWeights") -> None:

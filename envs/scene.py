@@ -15,6 +15,7 @@ from mjx_hand.bodies.human_body import body_of
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.objects.description import OBJECT_KINDS, ObjectDescription
+from mjx_hand.player.contact_force import add_contact_sensors
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand
 
@@ -44,6 +45,7 @@ def scene_spec(
     spare: int = 0,
     assisted: bool = False,
     contacts: str = "object",
+    forces: bool = False,
 ) -> mujoco.MjSpec:
     """The scene. Compiled, its qpos is the wrist's 3 slides (m) and 3 turns (rad), the hand's
     joints, the object's free joint.
@@ -62,6 +64,7 @@ def scene_spec(
             the object's axes).
         contacts: what the hand meets: the object alone, or also table and support ("ground"), its own links ("self"),
             or "all".
+        forces: with sensors of what each link does to the object, which MJX has not of its own (`envs.physics.mjx`).
     """
     if description.kind not in OBJECT_KINDS:
         raise InputError(f"object kind {description.kind!r} is not known; valid: {', '.join(OBJECT_KINDS)}")
@@ -91,6 +94,7 @@ def scene_spec(
         geom.rgba = (0.9, 0.35, 0.2, 1.0)
         meet_as_object(geom)
         _contact(geom, description.friction)
+    add_contact_sensors(spec, body_of(hand).touching_links if forces else (), OBJECT)
     # MJX alone reads these: it works every possible contact out, and is a tenth as quick without a cap.
     for name, most in MJX_CAPS.items():
         spec.add_numeric(name=name, data=[most])
@@ -153,6 +157,7 @@ def demonstration_spec(
     spare: int = 0,
     assisted: bool = False,
     contacts: str = "object",
+    forces: bool = False,
 ) -> mujoco.MjSpec:
     """The scene that a demonstration takes place in; arguments as of `scene_spec`."""
     return scene_spec(
@@ -166,6 +171,7 @@ def demonstration_spec(
         spare=spare,
         assisted=assisted,
         contacts=contacts,
+        forces=forces,
     )
 
 
@@ -183,13 +189,14 @@ def demonstration_models(
     assisted: bool = False,
     contacts: str = "object",
 ) -> list[mujoco.MjModel]:
-    """The scenes of demonstrations that run side by side, each on its own hand.
+    """The scenes of demonstrations that run side by side, each on its own hand, with sensors of its forces.
 
     An engine's models have equally many geoms: scenes whose supports have fewer boxes than others get spare ones, which
     touch nothing.
     """
+    chosen = {"gains": gains, "assisted": assisted, "contacts": contacts, "forces": True}
     return [
-        demonstration_spec(d, hand, gains=gains, spare=spare, assisted=assisted, contacts=contacts).compile()
+        demonstration_spec(d, hand, spare=spare, **chosen).compile()
         for d, hand, spare in zip(demonstrations, hands, spare_boxes(demonstrations), strict=True)
     ]
 

@@ -39,13 +39,14 @@ class Task:
             one once it is held (`mjx_hand.player.approach`).
         contacts: what the hand meets: "object" for nothing else, or also table and support ("ground"), its own links
             ("self"), or "all".
+        observe_forces: whether the policy sees what each link presses the object with, as a tactile skin does.
         observe_properties: whether the policy sees the object's mass and friction, which no camera does.
     """
 
     substeps: int = 5
     residual_scale_wrist_position: float = 0.02
-    residual_scale_wrist_rotation: float = 0.10
-    residual_scale_fingers: float = 0.35
+    residual_scale_wrist_rotation: float = 0.20
+    residual_scale_fingers: float = 0.7  # as strong as joints are: heavy objects slip out of less
     smoothing: float = 0.9
     rewards: RewardWeights = dataclasses.field(default_factory=RewardWeights)
     reward_position_alpha: float = 30.0
@@ -58,7 +59,8 @@ class Task:
     grip_force: float | None = None
     lookahead: tuple[int, ...] = (1, 4, 12)
     follow_object: bool = True
-    contacts: str = "object"
+    contacts: str = "all"
+    observe_forces: bool = False
     observe_properties: bool = False
 
     def __post_init__(self):
@@ -99,3 +101,12 @@ class Task:
     def assist_stiffness(self, progress: Float[Array, ""]) -> Float[Array, ""]:
         """Stiffness (1/s^2) of the virtual object controller at this share of the training."""
         return self.assist * jnp.clip(1 - progress / self.assist_until, 0.0, 1.0)
+
+
+def check_rate(fps: float, step: float) -> None:
+    """Raises InputError for demonstrations whose frames are not one control step (s) each."""
+    if abs(fps * step - 1) > 1e-3:
+        raise InputError(
+            f"demonstrations at {fps:g} frames/s do not fit control steps of {step * 1000:g} ms; "
+            f"resample them to {1 / step:g} frames/s"
+        )

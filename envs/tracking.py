@@ -20,6 +20,7 @@ from envs.disturbances.episode import delayed, pushing, seen_pose
 from envs.disturbances.randomize import Randomize
 from envs.disturbances.tables import disturbance_tables, disturbed_start
 from envs.disturbances.variation import draw_variations
+from envs.grip_force import least_contact_force
 from envs.observation import observe, residual_scale
 from envs.physics import make_engine
 from envs.physics.engine import PhysicsState
@@ -27,12 +28,11 @@ from envs.reference import Reference, cached_reference
 from envs.replay import assisted_replay
 from envs.rewards import TrackedStep, metric_names, weighted_terms
 from envs.scene import NUM_WRIST, OBJECT, demonstration_models
-from envs.task import Task
+from envs.task import Task, check_rate
 from envs.twin import Tables, Twin, twin_of
 from envs.varied_scene import varied_models
 from mjx_hand.bodies.body import Body
 from mjx_hand.bodies.human_body import check_one_kind
-from mjx_hand.errors import InputError
 from mjx_hand.files.array_cache import cached, model_bytes
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.rigid.gains import Gains
@@ -93,16 +93,13 @@ class TrackingEnv(Env):
         self.engine = make_engine(engine, scenes, self.task.substeps)
         self.dt = float(self.models[0].opt.timestep * self.task.substeps)
         self.fps = demonstrations[0].motion.fps
-        if abs(self.fps * self.dt - 1) > 1e-3:
-            raise InputError(
-                f"demonstrations at {self.fps:g} frames/s do not fit control steps of {self.dt * 1000:g} ms; "
-                f"resample them to {1 / self.dt:g} frames/s"
-            )
+        check_rate(self.fps, self.dt)
         limits = jnp.asarray(self.models[0].actuator_ctrlrange[: self.action_size], jnp.float32)
         starts = self._start_table(reference)
         self.tables = Tables(
             reference=reference,
             starts=starts,
+            needed=jnp.array([least_contact_force(model) for model in self.engine.models], jnp.float32),
             inertia=jnp.array([[m.body(OBJECT).mass[0], m.body(OBJECT).inertia.mean()] for m in self.models]),
             low=limits[:, 0],
             high=limits[:, 1],
@@ -268,6 +265,8 @@ class TrackingEnv(Env):
             tips_reference=self.reference.tips[place],
             action=action,
             change=moved / residual_scale(self.task, self.body.names, self.body.reach),
+            forces=twin.physics.contact[:, :3],
+            needed=self.tables.needed[twin.physics.variant],
         )
 
     def _errors(self, twin: Twin) -> tuple[Array, Array]:

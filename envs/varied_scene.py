@@ -38,7 +38,8 @@ def varied_model(
     """
     varied = dataclasses.replace(demonstration, object=varied_object(demonstration.object, variation))
     own = varied_gains(gains, variation.gains)
-    spec = demonstration_spec(varied, hand, gains=own, spare=spare, assisted=motors, contacts=contacts)
+    chosen = {"gains": own, "spare": spare, "assisted": motors, "contacts": contacts}
+    spec = demonstration_spec(varied, hand, forces=True, **chosen)
     centre = demonstration.object_pose[0, :3] * (1, 1, 0)
     turn = Rotation.from_rotvec([0.0, 0.0, variation.turn])
     for k, place in enumerate(demonstration.support_position):

@@ -15,7 +15,7 @@ from mjx_hand.objects.mesh_file import mesh_digest
 
 ALL = "all"
 GIVEN = "given"
-_VERSION = 3  # of the generator: a change that makes other demonstrations of the same settings raises it
+_VERSION = 4  # of the generator: a change that makes other demonstrations of the same settings raises it
 _RECORDED_VERSION = 5  # the same of what is made of a recording
 
 

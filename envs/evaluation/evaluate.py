@@ -85,6 +85,8 @@ def evaluate(
         "object_rotation_error_deg": metrics.over_counted(turned, rollouts),
         "moving_rotation_error_deg": metrics.over(turned, moving),
         "joint_error_cm": 100 * metrics.over_counted(metrics.joint_error(rollouts), rollouts),
+        "grip_force_newton": metrics.over(metrics.grip_force(rollouts), moving),
+        "grip_force_ratio": metrics.over(metrics.grip_force(rollouts), moving) / rollouts.needed,
         "tip_error_cm": 100 * metrics.over_counted(metrics.tip_error(rollouts), rollouts),
     }
     return Evaluation(
@@ -118,7 +120,7 @@ def _check(rollouts: Rollouts, num_objects: int) -> None:
             "give one object a demonstration"
         )
     used = rollouts.counted | rollouts.held
-    for name in ("object_pose", "object_reference", "joints", "joints_reference", "tips", "tips_reference"):
+    for name in ("object_pose", "object_reference", "joints", "joints_reference", "tips", "tips_reference", "contact"):
         values = getattr(rollouts, name)
         frames = rollouts.counted if name.endswith("reference") else used
         finite = np.isfinite(values).reshape(*frames.shape, -1).all(axis=-1)

@@ -55,6 +55,11 @@ def tip_error(rollouts: Rollouts) -> Float[np.ndarray, "n t"]:
     return np.linalg.norm(rollouts.tips - rollouts.tips_reference, axis=-1).mean(axis=-1)
 
 
+def grip_force(rollouts: Rollouts) -> Float[np.ndarray, "n t"]:
+    """Sum (N) of the sizes of the links' forces on the object, frame by frame."""
+    return np.linalg.norm(rollouts.contact[..., :3], axis=-1).sum(axis=-1)
+
+
 def moving(rollouts: Rollouts) -> Bool[np.ndarray, "n t"]:
     """Counted frames from the first on in which the demonstrated object is 5 mm or 5° from where it began.
 

@@ -44,20 +44,21 @@ def make_roll_out(
     steps = int(length.max()) - 1 + round(hold * env.fps)
 
     @jax.jit
-    def run(parameters: object, tables: Tables) -> tuple[Array, Array, Array]:
+    def run(parameters: object, tables: Tables) -> tuple[tuple[Array, ...], Array]:
         given = env.with_tables(tables)
 
         def step(state, _):  # type: ignore[no-untyped-def]
             actions = jnp.broadcast_to(policy(parameters, state.obs), (len(which), env.action_size))
             state = jax.vmap(given.step)(state, actions)
             physics = twin_of(state).physics
-            return state, (physics.qpos, physics.sensordata, state.reward)
+            return state, (physics.qpos, physics.sensordata, physics.contact, state.reward)
 
         first = jax.vmap(given.start)(jnp.asarray(which, jnp.int32), jnp.zeros(len(which), jnp.int32))
         physics = twin_of(first).physics
-        start = (physics.qpos, physics.sensordata, first.reward)
+        start = (physics.qpos, physics.sensordata, physics.contact, first.reward)
         _, rest = jax.lax.scan(step, first, length=steps)
-        return jax.tree.map(lambda a, b: jnp.moveaxis(jnp.concatenate([a[None], b]), 0, 1), start, rest)
+        frames = jax.tree.map(lambda a, b: jnp.moveaxis(jnp.concatenate([a[None], b]), 0, 1), start, rest)
+        return frames, tables.needed[physics.variant]
 
     # After a demonstration its last frame is the reference.
     frame = np.minimum(np.arange(steps + 1)[None], length[:, None] - 1)
@@ -71,7 +72,7 @@ def make_roll_out(
     held = (time >= length[:, None]) & (time < length[:, None] + round(hold * env.fps))
 
     def roll_out(parameters: object, tables: Tables | None = None) -> Rollouts:
-        qpos, sensors, reward = run(parameters, env.tables if tables is None else tables)
+        (qpos, sensors, contact, reward), needed = run(parameters, env.tables if tables is None else tables)
         joints, _ = places(qpos[..., :hand])
         return Rollouts(
             demonstration=which,
@@ -82,6 +83,8 @@ def make_roll_out(
             joints_reference=wanted_joints,
             tips=np.asarray(sensors).reshape(*sensors.shape[:2], -1, 3),
             tips_reference=wanted_tips,
+            contact=np.asarray(contact),
+            needed=np.asarray(needed),
             counted=counted,
             held=held,
             reward=np.asarray(reward),

@@ -28,6 +28,8 @@ class PhysicsState:
         variant: index of the model that this world runs on.
         qpos, qvel: generalised position and velocity (MuJoCo's layout and units, quaternions wxyz).
         sensordata: sensors that depend on position alone, at this very state (not a substep behind).
+        contact: how each link pressed the object in the last physics step: force (N) on the object, and where (m), both
+            along the world's axes; zeros for one that did not touch it, and after a reset.
         memory: the engine's own; opaque.
         unstable: 1 if the simulation diverged during the last step and was reset by the engine, else 0.
     """
@@ -36,6 +38,7 @@ class PhysicsState:
     qpos: Float[Array, "*b nq"]
     qvel: Float[Array, "*b nv"]
     sensordata: Float[Array, "*b ns"]
+    contact: Float[Array, "*b links 6"]
     memory: Any
     unstable: Float[Array, "*b"]
 

@@ -21,6 +21,7 @@ from mujoco import batch
 from envs.physics.engine import PhysicsState
 from envs.physics.host_call import HostCallback, call_host
 from envs.physics.solver import gauss_seidel
+from mjx_hand.player.contact_force import contact_columns, position_columns
 
 # Fields of the integration state that one step hands to the next, in its order and at the front of its rows; what comes
 # next, the control, comes with each step.
@@ -80,11 +81,13 @@ class NativeEngine:
         ends = np.cumsum([sizes[field] for field in CARRIED])
         self._slices = {f: slice(e - sizes[f], e) for f, e in zip(CARRIED, ends, strict=True)}
         self._size = int(ends[-1])
+        self._position, self._contact = position_columns(model), contact_columns(model)
         self._shapes = (
             jax.ShapeDtypeStruct((2 * self._size,), jnp.uint32),
             jax.ShapeDtypeStruct((model.nq,), jnp.float32),
             jax.ShapeDtypeStruct((model.nv,), jnp.float32),
-            jax.ShapeDtypeStruct((model.nsensordata,), jnp.float32),
+            jax.ShapeDtypeStruct((len(self._position),), jnp.float32),
+            jax.ShapeDtypeStruct(self._contact.shape, jnp.float32),
             jax.ShapeDtypeStruct((), jnp.float32),
         )
         self.tables = jnp.array([HostCallback(f).number for f in (self._host_reset, self._host_step)], jnp.int32)
@@ -103,9 +106,15 @@ class NativeEngine:
         return self._state(state.variant, call_host(self.tables[1], self._shapes, state.variant, state.memory, ctrl))
 
     def _state(self, variant: Int[Array, ""], out: tuple[Array, ...]) -> PhysicsState:
-        memory, qpos, qvel, sensordata, unstable = out
+        memory, qpos, qvel, sensordata, contact, unstable = out
         return PhysicsState(
-            variant=variant, qpos=qpos, qvel=qvel, sensordata=sensordata, memory=memory, unstable=unstable
+            variant=variant,
+            qpos=qpos,
+            qvel=qvel,
+            sensordata=sensordata,
+            contact=contact,
+            memory=memory,
+            unstable=unstable,
         )
 
     def _host_reset(self, variant: Any, qpos: Any, qvel: Any) -> tuple[np.ndarray, ...]:
@@ -117,7 +126,7 @@ class NativeEngine:
         with self._lock:
             _, placed = self._load(variant.reshape(-1))
             unstable = self._place(placed, carried)
-            return self._unload(placed, unstable, lead)
+            return self._unload(placed, np.zeros((variant.size, *self._contact.shape)), unstable, lead)
 
     def _host_step(self, variant: Any, memory: Any, ctrl: Any) -> tuple[np.ndarray, ...]:
         variant, memory, ctrl = np.asarray(variant), np.asarray(memory), np.asarray(ctrl)
@@ -131,7 +140,8 @@ class NativeEngine:
             moving.step(nstep=self.substeps)
             # Without it positions derived from the state, sensors among them, lag one substep behind it.
             unstable = self._place(placed, moving.state[:, : self._size]) | _diverged(moving)
-            return self._unload(placed, unstable, lead)
+            contact = np.where(unstable[:, None, None], 0.0, moving.bind("sensordata")[:, self._contact])
+            return self._unload(placed, contact, unstable, lead)
 
     def _load(self, variant: np.ndarray) -> _Worlds:
         """Worlds of this number that run the given variants."""
@@ -140,6 +150,7 @@ class NativeEngine:
             threads = min(self._threads, count)
             made = _Worlds(*(batch.Batch(m[0], nsim=count, nthread=threads) for m in (self.models, self._placed)))
             made.placed.bind("sensordata")
+            made.moving.bind("sensordata")
             self._worlds[count] = made
             self._running[count] = np.full(count, -1)
         worlds = self._worlds[count]
@@ -156,14 +167,17 @@ class NativeEngine:
         placed.forward(stage=mujoco.mjtStage.mjSTAGE_POS)
         return _diverged(placed)
 
-    def _unload(self, placed: batch.Batch, unstable: np.ndarray, lead: tuple[int, ...]) -> tuple[np.ndarray, ...]:
+    def _unload(
+        self, placed: batch.Batch, contact: np.ndarray, unstable: np.ndarray, lead: tuple[int, ...]
+    ) -> tuple[np.ndarray, ...]:
         carried = placed.state[:, : self._size].copy()
         moving = [carried[:, self._slices[field]] for field in ("qpos", "qvel")]
-        fields = [field.astype(np.float32) for field in (*moving, placed.bind("sensordata"))]
+        fields = [field.astype(np.float32) for field in (*moving, placed.bind("sensordata")[:, self._position])]
         bits = carried.view(np.uint32)
         return (
             bits.reshape(*lead, -1),
             *(f.reshape(*lead, -1) for f in fields),
+            contact.astype(np.float32).reshape(*lead, *self._contact.shape),
             unstable.astype(np.float32).reshape(lead),
         )
 

@@ -23,6 +23,7 @@ from envs.physics.family import Family, leaf_names, make_family
 from envs.physics.recovery import recovered
 from envs.physics.solver import newton
 from mjx_hand.errors import InputError
+from mjx_hand.player.contact_force import contact_columns
 from mjx_hand.rotations import quaternion_to_matrix
 
 # Else a line for each of a hundred kernels. Where Warp is not installed, its name means this module to type checkers.
@@ -54,6 +55,7 @@ class WarpEngine:
         self._family = make_family(models)
         _check_variable(self._family, models[0])
         self._sites = _sensor_sites(self.models[0])
+        self._contact = contact_columns(self.models[0])
         self._still = _geoms_of_the_world(self.models[0])
         self._capacity = _capacity(self.models[0])
 
@@ -69,21 +71,27 @@ class WarpEngine:
     def reset(
         self, variant: Int[Array, ""], qpos: Float[Array, "nq"], qvel: Float[Array, "nv"], ctrl: Float[Array, "nu"]
     ) -> PhysicsState:
-        return self._state(variant, qpos, qvel, jnp.zeros_like(qvel))
+        return self._state(variant, qpos, qvel, jnp.zeros_like(qvel), jnp.zeros(self._contact.shape))
 
     def step(self, state: PhysicsState, ctrl: Float[Array, "nu"]) -> PhysicsState:
         worlds = (state.variant, state.qpos, state.qvel, state.memory, ctrl)
-        qpos, qvel, warmstart = _only(_flattening(self._advance)(*(leaf[None] for leaf in worlds)))
+        qpos, qvel, warmstart, sensordata = _only(_flattening(self._advance)(*(leaf[None] for leaf in worlds)))
         # Warp clamps a control that is no number to its range, unnoticed.
         qpos = jnp.where(jnp.isfinite(ctrl).all(), qpos, jnp.nan)
-        return self._state(state.variant, qpos, qvel, warmstart)
+        return self._state(state.variant, qpos, qvel, warmstart, sensordata[self._contact])
 
-    def _state(self, variant: Array, qpos: Array, qvel: Array, warmstart: Array) -> PhysicsState:
+    def _state(self, variant: Array, qpos: Array, qvel: Array, warmstart: Array, contact: Array) -> PhysicsState:
         rest = self._family.model(variant).qpos0
         qpos, qvel, warmstart, unstable = recovered(rest, qpos, qvel, warmstart)
         (sensordata,) = _only(_flattening(self._look)(variant[None], qpos[None]))
         return PhysicsState(
-            variant=variant, qpos=qpos, qvel=qvel, sensordata=sensordata, memory=warmstart, unstable=unstable
+            variant=variant,
+            qpos=qpos,
+            qvel=qvel,
+            sensordata=sensordata,
+            contact=jnp.where(unstable > 0, 0.0, contact),
+            memory=warmstart,
+            unstable=unstable,
         )
 
     def _advance(self, variant: Array, qpos: Array, qvel: Array, warmstart: Array, ctrl: Array) -> tuple[Array, ...]:
@@ -95,7 +103,7 @@ class WarpEngine:
             data = self.placed(blank, model).replace(qpos=q, qvel=qd, qacc_warmstart=w, ctrl=u)
             # A loop, not copies of the call: Warp captures a CUDA graph for every set of buffers that it is given.
             data, _ = jax.lax.scan(lambda d, _: (mjx.step(model, d), None), data, length=self.substeps)
-            return data.qpos, data.qvel, data.qacc_warmstart
+            return data.qpos, data.qvel, data.qacc_warmstart, data.sensordata
 
         return jax.vmap(one)(variant, qpos, qvel, warmstart, ctrl)
 
@@ -186,7 +194,8 @@ def _geoms_of_the_world(model: mujoco.MjModel) -> np.ndarray:
 def _sensor_sites(model: mujoco.MjModel) -> np.ndarray:
     """The sites whose world positions are the sensors; Warp's other sensors would need a whole forward pass."""
     site, world = mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_UNKNOWN
-    for k in range(model.nsensor):
+    contact = model.sensor_type == mujoco.mjtSensor.mjSENS_CONTACT
+    for k in np.flatnonzero(~contact):
         if model.sensor_type[k] != mujoco.mjtSensor.mjSENS_FRAMEPOS or (
             (model.sensor_objtype[k], model.sensor_reftype[k]) != (site, world)
         ):
@@ -194,7 +203,7 @@ def _sensor_sites(model: mujoco.MjModel) -> np.ndarray:
                 f"engine 'warp' reads positions of sites in the world alone, not sensor {model.sensor(k).name!r}; "
                 "use engine 'native' or 'mjx'"
             )
-    return np.array(model.sensor_objid)
+    return np.array(model.sensor_objid)[~contact]
 
 
 def _capacity(model: mujoco.MjModel) -> tuple[int, int, int]:

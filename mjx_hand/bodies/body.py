@@ -81,7 +81,7 @@ class Body:
     @cached_property
     def names(self) -> HandNames:
         """What its numbers are called."""
-        return HandNames(self.joints, self.fingers)
+        return HandNames(self.joints, self.fingers, self.touching_links)
 
     @cached_property
     def reach(self) -> float:
@@ -90,6 +90,11 @@ class Body:
             return 1.0
         own, human = (np.median(gains.force_limit / gains.stiffness) for gains in (self.gains, Gains()))
         return float(own / human)
+
+    @cached_property
+    def touching_links(self) -> tuple[str, ...]:
+        """The bodies that have `contacts`; rows of contact forces follow them."""
+        return tuple(dict.fromkeys(contact.link for contact in self.contacts))
 
     @property
     def num_targets(self) -> int:

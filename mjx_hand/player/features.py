@@ -16,21 +16,24 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from mjx_hand.hand.joints import FINGERS, HINGES, WRIST_SLIDES, WRIST_TURNS
+from mjx_hand.hand.joints import FINGERS, HINGES, LINKS, WRIST_SLIDES, WRIST_TURNS
 
 OBSERVATION_LIMIT = 5.0  # of an observation
 WRIST = (*WRIST_SLIDES, *WRIST_TURNS)
 _NUM_WRIST = len(WRIST)
 _XYZ = ("x", "y", "z")
+CONTACT_FORCES = "contact_forces"  # a feature's name
 _PER_LENGTH = 30.0  # 1/m, for errors of the object: 3 cm
 
 
 @dataclasses.dataclass(frozen=True)
 class HandNames:
-    """What a hand's numbers are called, in order: its actuated joints, without the wrist's, and its fingers."""
+    """What a hand's numbers are called, in order: its actuated joints, without the wrist's, its fingers, and its links
+    that touch."""
 
     joints: tuple[str, ...] = HINGES
     fingers: tuple[str, ...] = FINGERS
+    links: tuple[str, ...] = LINKS
 
     @property
     def targets(self) -> tuple[str, ...]:
@@ -59,6 +62,7 @@ class ObservedState:
         object_axes: (3, 3) world_from_object.
         wrist_place, wrist_axes: (3,) and (3, 3) world_from_hand.
         tips: (fingers, 3) finger tips in the world.
+        forces: (links, 3) what each link presses the object with (N, world) in the last physics step.
         base: (3, 3) world_from_base of the scene's wrist.
         target, grip: (u,) demonstrated coordinates, and the share of the controls that presses.
         pose: (7,) demonstrated object.
@@ -78,6 +82,7 @@ class ObservedState:
     wrist_place: Any
     wrist_axes: Any
     tips: Any
+    forces: Any
     base: Any
     target: Any
     grip: Any
@@ -186,6 +191,15 @@ def feature_table(
             tuple(f"{finger}_{axis}" for finger in hand.fingers for axis in _XYZ),
             lambda s: (s.tips - s.object_pose[:3]) @ s.object_axes,
             _PER_LENGTH,
+        ),
+        Feature(
+            CONTACT_FORCES,
+            "what each link presses the object with",
+            "N",
+            "hand",
+            tuple(f"{link}_{axis}" for link in hand.links for axis in _XYZ),
+            lambda s: s.forces @ s.wrist_axes,
+            0.1,
         ),
         *(feature for k, ahead in enumerate(lookahead) for feature in _of_frame_ahead(targets, k, ahead)),
         *(_of_object_ahead(k, ahead) for k, ahead in enumerate(lookahead)),

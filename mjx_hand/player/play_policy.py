@@ -10,8 +10,9 @@ from jaxtyping import Float
 
 from mjx_hand.errors import InputError
 from mjx_hand.player.approach import approach_weights, displacement, followed
+from mjx_hand.player.contact_force import contact_columns
 from mjx_hand.player.exported_policy import ExportedPolicy, load_exported_policy
-from mjx_hand.player.features import WRIST, Feature, HandNames, ObservedState, feature_table
+from mjx_hand.player.features import CONTACT_FORCES, WRIST, Feature, HandNames, ObservedState, feature_table
 from mjx_hand.player.tracking_reference import TrackingReference, load_tracking_reference
 
 _FREE = 7  # coordinates of the object, the last of a scene's; of its speed one less
@@ -91,6 +92,7 @@ class Player:
         self.data = mujoco.MjData(self.model)
         self._features = _features(policy, reference, names)
         self._tips = [self.model.site(f"{finger}_tip").id for finger in names.fingers]
+        self._forces = contact_columns(self.model)[:, :3]
         self._wrist, self._object = self.model.body("wrist").id, self.model.body("object").id
         joints = [self.model.joint(name) for name in names.targets]
         self._qpos, self._qvel = ([int(j.qposadr[0]) for j in joints], [int(j.dofadr[0]) for j in joints])
@@ -144,6 +146,7 @@ class Player:
             wrist_place=data.xpos[self._wrist],
             wrist_axes=data.xmat[self._wrist].reshape(3, 3),
             tips=data.site_xpos[self._tips],
+            forces=data.sensordata[self._forces],
             base=reference.base,
             target=reference.targets[frame] + self._followed(frame),
             grip=reference.grip[frame],
@@ -201,7 +204,9 @@ def _hand(policy: ExportedPolicy) -> HandNames:
         joints, places = elements["grip"], elements["tips_in_object"]
     except KeyError as missing:
         raise InputError(f"the policy's contract has no input {missing}; export the policy again") from None
-    return HandNames(tuple(joints), tuple(dict.fromkeys(place.rpartition("_")[0] for place in places)))
+    fingers = dict.fromkeys(place.rpartition("_")[0] for place in places)
+    links = dict.fromkeys(place.rpartition("_")[0] for place in elements.get(CONTACT_FORCES, ()))
+    return HandNames(tuple(joints), tuple(fingers), tuple(links))
 
 
 def _scene(path: Path, hand: HandNames) -> mujoco.MjModel:

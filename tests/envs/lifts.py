@@ -30,6 +30,8 @@ def lift(frames: int = 40, held: int = 0, rows: int = 1) -> Rollouts:
         joints_reference=hand.copy(),
         tips=tips,
         tips_reference=tips.copy(),
+        contact=np.zeros((rows, total, 16, 6)),
+        needed=np.ones(rows),
         counted=np.tile(counted, (rows, 1)),
         held=np.tile(~counted, (rows, 1)),
         reward=np.zeros((rows, total)),

@@ -76,12 +76,12 @@ def test_it_lifts_an_object_that_the_hand_leaves_behind(demonstrations, hands, s
         state = state.replace(info={**state.info, "progress": jnp.asarray(progress)})
         errors = []
         for _ in range(last):
-            state = step(state, jnp.zeros(26).at[6:].set(-1.0))  # fingers wide open
+            state = step(state, jnp.zeros(26).at[6:].set(-0.5))  # fingers wide open
             errors.append(float(state.metrics["error/position"]))
         return max(errors)
 
     assert highest(1.0) > 0.09
-    assert highest(0.0) < 0.6 * highest(1.0)
+    assert highest(0.0) < 0.7 * highest(1.0)
 
 
 def test_progress_reaches_every_world_and_survives_restarts(env):

@@ -54,7 +54,7 @@ def test_a_reference_by_mujoco_is_that_of_the_capsules(demonstrations, hands, bo
     np.testing.assert_allclose(by_jax.tips, by_mujoco.tips, atol=2e-6)
     for k, frames in enumerate(lifted):
         one, other = np.asarray(by_jax.grip)[k, frames], np.asarray(by_mujoco.grip)[k, frames]
-        assert np.abs(one - other).mean() < 0.1 * np.abs(one).mean()
+        assert np.abs(one - other).mean() < 0.25 * np.abs(one).mean()
 
 
 def test_no_grip_where_none_is_asked_for(demonstrations, bodies):

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 from brax.envs.wrappers.training import AutoResetWrapper, EpisodeWrapper, VmapWrapper
 
+from envs.task import Task
+from envs.tracking import TrackingEnv
+
 WORLDS, LENGTH = 2, 12
+
+
+@pytest.fixture(scope="module")
+def env(demonstrations, hands):
+    """Every episode begins at frame 0, where nothing can be dropped yet."""
+    return TrackingEnv(demonstrations, hands, "native", Task(random_start_prob=0.0))
 
 
 @pytest.fixture(scope="module")

@@ -130,9 +130,14 @@ def test_environments_have_what_the_task_says(demonstrations, hands):
         assert env.engine.models[0].npair == pairs
 
 
-def test_mjx_refuses_contacts_that_it_does_not_have():
-    with pytest.raises(InputError, match=r"'mjx' cannot let the hand meet itself .* use engine 'native' or 'warp'"):
-        make_engine("mjx", [scene("all")], 5)
+def test_mjx_has_the_same_pairs_with_a_little_friction():
+    given = scene("all")
+    engine = make_engine("mjx", [given], 5)
+    (model,) = engine.models
+    assert model.npair == given.npair == 140
+    assert (given.pair_dim == 1).all()
+    assert (model.pair_dim == 3).all()
+    np.testing.assert_allclose(model.pair_friction, 0.001)
 
 
 def test_what_is_no_choice_is_refused():

@@ -47,7 +47,7 @@ def test_spare_boxes_change_nothing(mixed, hands, env, lifted):
     paths = []
     frame = lifted[0][10]
     for spare in (0, 3):
-        model = demonstration_spec(mixed[0], hands[0], spare=spare).compile()
+        model = demonstration_spec(mixed[0], hands[0], spare=spare, contacts=env.task.contacts).compile()
         data = mujoco.MjData(model)
         data.qpos[:] = np.asarray(env.tables.starts.qpos[0, frame])
         for k in range(10):
@@ -59,10 +59,9 @@ def test_spare_boxes_change_nothing(mixed, hands, env, lifted):
 
 
 def test_alone_no_type_has_spare_boxes(demonstrations, hands, env):
-    first, alone = (
-        demonstration_models(demonstrations, hands)[0],
-        demonstration_spec(demonstrations[0], hands[0]).compile(),
-    )
+    given = {"contacts": env.task.contacts}
+    first = demonstration_models(demonstrations, hands, **given)[0]
+    alone = demonstration_spec(demonstrations[0], hands[0], forces=True, **given).compile()
     for model in (first, env.models[0]):
         np.testing.assert_array_equal(model.geom_pos, alone.geom_pos)
         assert model.names == alone.names

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from envs.observation import observed_features
+from envs.observation import observe, observed_features
 from envs.task import Task
-from mjx_hand.player.features import TARGETS, offsets_and_scales
+from mjx_hand.player.features import CONTACT_FORCES, TARGETS, offsets_and_scales
 
 TARGET_SCALE = np.concatenate([np.full(3, 50.0), np.full(23, 5.0)])
 SPEED_SCALE = np.concatenate([np.full(3, 5.0), np.full(3, 0.5), np.full(20, 0.2)])
@@ -69,6 +69,25 @@ def test_the_observation_is_its_formula(env, step, demonstration, frame):
         wanted = expected(env, demonstration, int(twin.frame), twin)
         np.testing.assert_allclose(state.obs, wanted, atol=1e-4)
     assert np.abs(np.asarray(state.pipeline_state.residual)).max() > 0
+
+
+def test_a_policy_may_feel_what_each_link_presses(env, step):
+    start = jax.jit(env.start)(jnp.asarray(0, jnp.int32), jnp.asarray(150, jnp.int32))
+    state = step(start, jnp.zeros(26))
+    twin = state.pipeline_state
+    forces = np.asarray(twin.physics.contact)[:, :3]
+    assert np.linalg.norm(forces, axis=-1).sum() > 1.0
+    task = dataclasses.replace(env.task, observe_forces=True)
+    told = env.reference, task, env.body, twin.demonstration, twin.frame, twin.physics, twin.residual
+    felt = np.asarray(observe(*told))
+    rows = [[feature.name] * feature.size for feature in observed_features(task, env.body.names)]
+    names = np.concatenate(rows)
+    np.testing.assert_allclose(felt[names != CONTACT_FORCES], state.obs, atol=1e-6)
+    data = mujoco.MjData(env.models[0])
+    data.qpos[:] = twin.physics.qpos
+    mujoco.mj_kinematics(env.models[0], data)
+    wanted = np.clip(0.1 * forces @ data.body("wrist").xmat.reshape(3, 3), -5, 5)
+    np.testing.assert_allclose(felt[names == CONTACT_FORCES], wanted.ravel(), atol=1e-4)
 
 
 def test_the_table_names_every_number_once():

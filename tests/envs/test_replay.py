@@ -7,6 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from envs.replay import assisted_replay
 from envs.scene import NUM_WRIST, OBJECT
+from envs.task import Task
+from envs.tracking import TrackingEnv
 from mjx_hand.hand.joints import NUM_HINGES
 
 NUM_TARGETS = NUM_WRIST + NUM_HINGES
@@ -44,8 +46,9 @@ def test_the_hand_is_near_its_targets(env):
     assert (controls <= high).all()
 
 
-def test_most_mid_grasp_starts_hold_the_object_by_themselves(env, lifted):
-    """From the table's states, with no action at all, most objects are where they should be 0.2 s later."""
+def test_most_mid_grasp_starts_hold_the_object_by_themselves(demonstrations, hands, lifted):
+    """From the table's states, with a firm grip and no action at all, most objects are in place 0.2 s later."""
+    env = TrackingEnv(demonstrations, hands, "native", Task(grip_force=8.0))
     demos = np.concatenate([np.full(len(f[:-15:5]), k) for k, f in enumerate(lifted)])
     frames = np.concatenate([f[:-15:5] for f in lifted])
     state = jax.vmap(env.start)(jnp.asarray(demos, jnp.int32), jnp.asarray(frames, jnp.int32))

@@ -18,7 +18,7 @@ def test_weights_that_make_no_reward_are_refused(weight):
 def test_a_term_is_one_function_with_its_default_weight():
     assert {name: (term.sign * term.weight) for name, term in TERMS.items()} == {
         **{"position": 1.0, "rotation": 1.0, "action": -0.002},
-        **{"joints": 0.0, "tips": 0.0, "action_rate": 0.0},
+        **{"joints": 0.0, "tips": 0.0, "action_rate": 0.0, "grip_force": 0.0},
     }
     weights: Any = Task().rewards
     assert dataclasses.asdict(weights) == {name: term.weight for name, term in TERMS.items()}

@@ -50,7 +50,8 @@ def _save(env: TrackingEnv, number: int, folder: Path) -> dict[str, Any]:
         substeps=env.task.substeps,
         scene=f"{name}.xml",
     )
-    (folder / reference.scene).write_text(scene_xml(demonstration, env.hands[number], env.task.contacts))
+    scene = scene_xml(demonstration, env.hands[number], env.task.contacts, env.task.observe_forces)
+    (folder / reference.scene).write_text(scene)
     save_tracking_reference(reference, folder / f"{name}.npz")
     return {
         "reference": f"{FOLDER}/{name}.npz",

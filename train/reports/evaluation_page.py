@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from envs.evaluation.evaluate import Evaluation
-from envs.evaluation.metrics import position_error
+from envs.evaluation.metrics import grip_force, position_error
 from envs.evaluation.people import people_of, person_scores
 from mjx_hand.view.figures import plots
 from mjx_hand.view.report import Film, Headline, Plot, Report, Section, Table
@@ -36,6 +36,11 @@ from train.settings.config import Config
 from train.view.video import film
 
 TRACKING = "Distance of the object from where the demonstration has it."
+
+FORCE = (
+    "Sum of the sizes of the links' forces on the object, over m g sqrt(1 + μ²) / μ, the least that carries it by its "
+    "upright faces."
+)
 
 
 def tables(results: Mapping[int, Results], config: Config) -> tuple[Table, ...]:
@@ -90,6 +95,20 @@ def tracking_plot(results: Mapping[int, Results]) -> Figure:
     errors = {POLICY: (together, np.concatenate([r.counted for r in every]))}
     errors |= {t: (100 * position_error(first.rollouts[t]), first.rollouts[t].counted) for t in BASELINES}
     return plots.error_over_time(first.env.fps, errors, limit=3.0)
+
+
+def force_plot(results: Mapping[int, Results]) -> Figure:
+    """Grip force over time, over the least that carries the object: the policy, all seeds together, and the press."""
+    first = next(iter(results.values()))
+    chosen = {POLICY: [r.rollouts[POLICY] for r in results.values()], PRESS: [first.rollouts[PRESS]]}
+    ratios = {
+        title: (
+            np.concatenate([grip_force(r) / r.needed[:, None] for r in each]),
+            np.concatenate([r.counted for r in each]),
+        )
+        for title, each in chosen.items()
+    }
+    return plots.error_over_time(first.env.fps, ratios, label="grip force / least", limit=1.0, limit_label="carries")
 
 
 def films(results: Mapping[int, Results], folder: Path) -> dict[str, Film]:
@@ -167,6 +186,7 @@ def evaluation_page(
             ),
             Section("Demonstration and twin", [shown["worst"], shown["median"]]),
             Section("Tracking error over time", [Plot(tracking_plot(results), TRACKING)]),
+            Section("Grip force", [Plot(force_plot(results), FORCE)]),
             Section("The hand in itself and the ground", [overlaps(results)]),
             *([Section("Every person", [people_table(people)])] if people else []),
             Section("How failures failed", [failures]),

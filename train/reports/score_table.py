@@ -25,6 +25,8 @@ TITLES = {
     "moving_error_cm": "tracking error from when the object is to move",
     "object_rotation_error_deg": "object rotation error",
     "moving_rotation_error_deg": "object rotation error from when it is to move",
+    "grip_force_newton": "grip force from then on, sum over the links",
+    "grip_force_ratio": "grip force over the least that carries the object",
     "joint_error_cm": "joint position error",
     "tip_error_cm": "finger tip position error",
 }
@@ -130,17 +132,20 @@ def share_text(share: float, interval: tuple[float, float]) -> str:
 
 def score_text(name: str, value: float) -> str:
     """A metric's value with its unit."""
-    unit = " cm" if name.endswith("_cm") else "°" if name.endswith("_deg") else "" if name == "add_auc" else " %"
-    return f"{score_number(name, value)}{unit}"
+    return f"{score_number(name, value)}{_kind(name)[0]}"
 
 
 def score_number(name: str, value: float) -> str:
     """A metric's value in its unit, without it."""
-    if name.endswith("_cm"):
-        return f"{value:.2f}"
-    if name.endswith("_deg"):
-        return f"{value:.1f}"
-    return f"{value:.3f}" if name == "add_auc" else f"{100 * value:.1f}"
+    _, factor, digits = _kind(name)
+    return f"{factor * value:.{digits}f}"
+
+
+def _kind(name: str) -> tuple[str, float, int]:
+    """A metric's unit as it is written, what its value is multiplied by, and digits after the point."""
+    shares = {"add_auc": ("", 1.0, 3)}
+    ends = {"_cm": (" cm", 1.0, 2), "_deg": ("°", 1.0, 1), "_newton": (" N", 1.0, 1), "_ratio": ("", 1.0, 2)}
+    return shares.get(name) or next((kind for end, kind in ends.items() if name.endswith(end)), (" %", 100.0, 1))
 
 
 _REASONS = (

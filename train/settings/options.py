@@ -23,7 +23,7 @@ class Ppo:
         initial_std: standard deviation of actions at first; a residual of 1 is the task's full range.
     """
 
-    num_updates: int = 250
+    num_updates: int = 300
     num_timesteps: int | None = None
     num_envs: int = 256
     unroll_length: int = 16
@@ -37,7 +37,7 @@ class Ppo:
     max_grad_norm: float = 1.0
     policy_layers: tuple[int, ...] = (128, 128)
     value_layers: tuple[int, ...] = (256, 256)
-    initial_std: float = 0.4
+    initial_std: float = 0.25
 
     def __post_init__(self):
         for name in ("policy_layers", "value_layers"):

@@ -4,7 +4,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from envs.evaluation.metrics import position_error, rotation_error
+from envs.evaluation.contact_arrows import contact_arrows
+from envs.evaluation.metrics import grip_force, position_error, rotation_error
 from envs.evaluation.rollout import Rollouts
 from envs.scene import NUM_WRIST, base_rotation
 from mjx_hand.hand.load import load_hand
@@ -13,10 +14,11 @@ from mjx_hand.motion.resample import quaternion_matrices
 from mjx_hand.pytree import replace
 from mjx_hand.rigid.rigid_hand import RigidHand
 from mjx_hand.view.browser.hand_scene import object_layers, skin_layer, skinned_motion, transforms, twin_layer
-from mjx_hand.view.browser.scene import Colour, Curve, MeshLayer, Scene, SkinLayer
+from mjx_hand.view.browser.scene import Colour, Curve, MeshLayer, PointLayer, Scene, SkinLayer
 
 _GHOST: Colour = (150, 150, 150)
 _FAINT = 0.35
+_FORCE: Colour = (25, 90, 230)
 
 
 def rollout_scene(demonstration: Demonstration, rollouts: Rollouts, index: int, hand: RigidHand, title: str) -> Scene:
@@ -47,12 +49,23 @@ def rollout_scene(demonstration: Demonstration, rollouts: Rollouts, index: int, 
         ghost(twin_layer(shown.motion, hand, "demonstration")),
         ghost(replace(wanted, name="demonstrated object")),
         *support,
+        force_layer(rollouts, index),
     )
     curves = (
         Curve("object, position error", 100 * position_error(rollouts)[index, frames], "cm"),
         Curve("object, rotation error", np.rad2deg(rotation_error(rollouts)[index, frames]), "degrees"),
+        Curve("grip force", grip_force(rollouts)[index, frames], "N"),
     )
     return Scene(title=title, fps=rollouts.fps, layers=layers, curves=curves, ground=0.0)
+
+
+def force_layer(rollouts: Rollouts, index: int) -> PointLayer:
+    """What each link presses the object with, as lines of 5 mm/N that end where it touches, in the counted frames."""
+    arrows = contact_arrows(rollouts, index, np.flatnonzero(rollouts.counted[index]))
+    count = arrows.shape[1]
+    lines = np.stack([np.arange(count), count + np.arange(count)], axis=1)
+    points = np.concatenate([arrows[:, :, 0], arrows[:, :, 1]], axis=1)
+    return PointLayer("forces on the object", points, _FORCE, radius=0.0015, lines=lines)
 
 
 def twin_motion(demonstration: Demonstration, rollouts: Rollouts, index: int) -> JointMotion:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from envs.evaluation.contact_arrows import contact_arrows
 from envs.evaluation.rollout import Rollouts
 from envs.scene import demonstration_spec
 from envs.tracking import TrackingEnv
@@ -25,7 +26,8 @@ def film(env: TrackingEnv, rollouts: Rollouts, index: int, path: Path, caption: 
 
 
 def side_by_side(env: TrackingEnv, rollouts: Rollouts, index: int, path: str | Path) -> None:
-    """Write an MP4 of rollout `index`: left what was demonstrated, right what the twin did.
+    """Write an MP4 of rollout `index`: left what was demonstrated, right what the twin did, its
+    links' forces on the object as arrows of 5 mm/N.
 
     Raises:
         RendererUnavailable: this machine cannot render.
@@ -41,5 +43,6 @@ def side_by_side(env: TrackingEnv, rollouts: Rollouts, index: int, path: str | P
     done = rollouts.qpos[index, frames]
     size = (480, 480)
     left = render_frames(model, wanted, size=size, caption="demonstration")
-    right = render_frames(model, done, watched=wanted, size=size, caption="twin")
+    pressed = contact_arrows(rollouts, index, frames)
+    right = render_frames(model, done, watched=wanted, arrows=pressed, size=size, caption="twin, and how it presses")
     write_video(path, beside(left, right), rollouts.fps / max(round(rollouts.fps / _RATE), 1))

@@ -15,7 +15,7 @@ from mjx_hand.hand.joints import LINKS, NUM_HINGES
 from mjx_hand.objects.description import ObjectDescription
 from mjx_hand.objects.primitives import face_along, half_extents, hull_planes, signed_distance
 from mjx_hand.pytree import pytree
-from mjx_hand.rigid.capsules import capsule_points, last_capsule
+from mjx_hand.rigid.capsules import axis_distance, capsule_points, finger_pairs, last_capsule
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics, stack_hands
 from mjx_hand.rotations import exp
@@ -27,6 +27,7 @@ _OPENING_DAMPING = 0.01  # m/rad
 # What one unit of residual is worth (m, rad).
 _TOUCH, _SLIDE, _CLEAR, _SWAY, _TILT, _PLACE = 0.0005, 0.004, 0.001, 0.5, 0.3, 0.01
 _INTO = 0.0003  # m: how far contacts may sink in
+_BETWEEN = 0.001  # m: room between two fingers, for what a script's squeeze and a capture add
 
 
 @pytree
@@ -108,6 +109,7 @@ def _solve(grasp: GraspType, kind: str, hand: RigidHand, size: Array, planes: Ar
     seed_angles, seed_rotation = jnp.array(grasp.posture), jnp.array(grasp.wrist_rotation)
     world_from_object = jnp.array(grasp.object_rotation)
     radius = hand.capsule_radius
+    one, other = jnp.array(finger_pairs(hand)).T
     wraps = isinstance(grasp.closing, Wrap)
     faces = (jnp.zeros(0),) * 2 if wraps else _faces(grasp, kind, size, planes)
     slack = jnp.full(len(hand.capsule_links), 0.0 if wraps else 0.001).at[capsules].set(-_INTO)
@@ -135,7 +137,7 @@ def _solve(grasp: GraspType, kind: str, hand: RigidHand, size: Array, planes: Ar
         towards = jnp.sum(gap * normals, axis=-1)
         return towards, (gap - towards[:, None] * normals).ravel()
 
-    def residual(x: Array) -> Array:
+    def residual(x: Array, spread: float) -> Array:
         towards, sideways = gaps(x)
         points = axis_points(x)
         clear = distance(points) - (radius + slack)[:, None]
@@ -143,6 +145,8 @@ def _solve(grasp: GraspType, kind: str, hand: RigidHand, size: Array, planes: Ar
         above = points + jnp.array([0.0, 0.0, grasp.rest]) + height * jnp.array([0.0, 0.0, 1.0])
         ground = [above[..., 2]]
         ground += [signed_distance("box", jnp.array(box.half), above - jnp.array(box.centre)) for box in grasp.support]
+        ends = points[:, jnp.array([0, -1])]
+        apart = axis_distance(ends[one], ends[other]) - radius[one] - radius[other] - _BETWEEN
         angles = x[:NUM_HINGES]
         outside = jnp.maximum(angles - hand.hinge_upper, 0) + jnp.maximum(hand.hinge_lower - angles, 0)
         return jnp.concatenate(
@@ -151,6 +155,7 @@ def _solve(grasp: GraspType, kind: str, hand: RigidHand, size: Array, planes: Ar
                 sideways / _SLIDE,
                 jnp.minimum(clear, 0).ravel() / _CLEAR,
                 *(jnp.minimum(g - radius[:, None] - 0.002, 0).ravel() / _CLEAR for g in ground),
+                spread * jnp.minimum(apart, 0) / _CLEAR,
                 (angles - seed_angles) / _SWAY,
                 outside / 0.02,
                 x[NUM_HINGES : NUM_HINGES + 3] / _TILT,
@@ -168,7 +173,10 @@ def _solve(grasp: GraspType, kind: str, hand: RigidHand, size: Array, planes: Ar
     start = jnp.concatenate([seed_angles, jnp.zeros(6)])
     # Begin with the object in its place, or the contacts' centre on the object's: the solver needs no other guess.
     centre = seed_rotation @ out_of_place(start) if wraps else -contacts(start).mean(axis=0)
-    x = _levenberg_marquardt(residual, start.at[-3:].add(centre))
+    # Fingers pass through each other on their way to the object; those that stayed in each other then make room.
+    x = start.at[-3:].add(centre)
+    for spread in (0.0, 1.0):
+        x = _levenberg_marquardt(partial(residual, spread=spread), x)
     normals = jax.vmap(jax.grad(distance))(contacts(x)) if wraps else faces[1] @ world_from_object.T
 
     def skin_points(angles: Array) -> Array:

@@ -172,10 +172,17 @@ def draw_scripts(
                 object_start=np.concatenate([centre, upright]),
                 motion=_draw_motion(grasp, posture, centre, hand, gains, rng),
                 base=posture.rotation,
-                model=scene_spec(hand, description, *support_boxes(grasp), posture.rotation, gains=gains).compile(),
+                model=_scene(grasp, hand, description, posture.rotation, gains),
             )
         )
     return scripts
+
+
+def _scene(
+    grasp: GraspType, hand: RigidHand, description: ObjectDescription, base: Float[np.ndarray, "3 3"], gains: Gains
+) -> mujoco.MjModel:
+    """Where a person performs: their hand meets itself, table and support, as a person's does."""
+    return scene_spec(hand, description, *support_boxes(grasp), base, gains=gains, contacts="all").compile()
 
 
 def support_boxes(grasp: GraspType) -> tuple[Float[np.ndarray, "b 3"], Float[np.ndarray, "b 3"]]:

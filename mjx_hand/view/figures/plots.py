@@ -94,6 +94,7 @@ def error_over_time(
     *,
     label: str = "object position error (cm)",
     limit: float | None = None,
+    limit_label: str = "{:g} cm",
 ) -> Figure:
     """Errors over the demonstration's time: each method's median, with bands of 50 % and 80 % of its rollouts.
 
@@ -102,6 +103,7 @@ def error_over_time(
         errors: method name to its errors and the mask of frames that count; frames of no rollout are not drawn.
         label: of the vertical axis.
         limit: a threshold to draw as a level.
+        limit_label: what it is called, with its value in place of {:g}.
 
     Raises:
         InputError: a method without a counted frame.
@@ -118,7 +120,7 @@ def error_over_time(
         axes.fill_between(time, lower, upper, color=colour, alpha=0.22, linewidth=0)
         axes.plot(time, middle, color=colour, label=name)
     if limit is not None:
-        axes.axhline(limit, color=_INK, linestyle=(0, (1, 2)), linewidth=1.2, label=f"{limit:g} cm")
+        axes.axhline(limit, color=_INK, linestyle=(0, (1, 2)), linewidth=1.2, label=limit_label.format(limit))
     axes.set_ylim(bottom=0)
     axes.margins(x=0.01)
     axes.set_xlabel("time (s)")

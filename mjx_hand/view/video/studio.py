@@ -4,11 +4,13 @@ import copy
 
 import mujoco
 import numpy as np
+from jaxtyping import Float
 
 BACKDROP = (0.90, 0.91, 0.93)
 SKIN = (0.86, 0.66, 0.55, 1.0)
 COLLISION_GROUP = 3  # as `rigid.export.mjcf` has it
 HIDDEN_GROUP = 5
+_ARROW, _ARROW_WIDTH = (0.10, 0.35, 0.90, 1.0), 0.003  # m
 
 
 def studio_model(model: mujoco.MjModel, width: int, height: int) -> mujoco.MjModel:
@@ -53,6 +55,17 @@ def light_scene(scene: mujoco.MjvScene, camera: mujoco.MjvCamera) -> None:
     _add_light(scene, look, -0.5 * ahead + 0.55 * left + 1.0 * up, (0.62, 0.60, 0.57), shadow=True)
     _add_light(scene, look, -0.3 * ahead - 0.9 * left + 0.4 * up, (0.20, 0.22, 0.26), shadow=False)
     _add_backdrop(scene, look + 4.0 * ahead, ahead, left, up)
+
+
+def add_arrows(scene: mujoco.MjvScene, arrows: Float[np.ndarray, "n 2 3"]) -> None:
+    """Add arrows from their first to their second points (m, world) to a scene; those with NaN are left out."""
+    for start, end in arrows[np.isfinite(arrows).all(axis=(1, 2))]:
+        geom = scene.geoms[scene.ngeom]
+        kind = mujoco.mjtGeom.mjGEOM_ARROW
+        mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), np.array(_ARROW))
+        mujoco.mjv_connector(geom, kind, _ARROW_WIDTH, start, end)
+        geom.category = mujoco.mjtCatBit.mjCAT_DECOR
+        scene.ngeom += 1
 
 
 def _add_light(

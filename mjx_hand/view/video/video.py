@@ -16,7 +16,7 @@ from mjx_hand.files.npz_archive import replacing
 from mjx_hand.view.video.camera import Camera, camera_path
 from mjx_hand.view.video.encoder import encoder
 from mjx_hand.view.video.renderer import open_renderer
-from mjx_hand.view.video.studio import COLLISION_GROUP, light_scene, studio_model
+from mjx_hand.view.video.studio import COLLISION_GROUP, add_arrows, light_scene, studio_model
 
 Frame = UInt8[np.ndarray, "h w 3"]
 
@@ -27,6 +27,7 @@ def render_frames(
     camera: Camera | None = None,
     *,
     watched: Float[np.ndarray, "_ _"] | None = None,
+    arrows: Float[np.ndarray, "t n 2 3"] | None = None,
     size: tuple[int, int] = (640, 480),
     caption: str = "",
 ) -> Generator[Frame, None, None]:
@@ -38,6 +39,7 @@ def render_frames(
         camera: the default follows the body "object".
         watched: the take whose object the camera follows, so that two takes side by side are seen alike; the default
             is qpos itself.
+        arrows: from where to where (m) arrows go in each picture; one with NaN is not drawn.
         size: width and height in pixels, both even.
         caption: written into the top left corner.
 
@@ -54,12 +56,16 @@ def render_frames(
     watched = qpos if watched is None else watched
     if watched.shape != qpos.shape:
         raise InputError(f"watched has shape {watched.shape}, but qpos has {qpos.shape}; give takes of one length")
-    return _frames(model, qpos, camera_path(model, watched, camera), size, caption)
+    arrows = np.zeros((len(qpos), 0, 2, 3)) if arrows is None else arrows
+    if len(arrows) != len(qpos):
+        raise InputError(f"arrows of {len(arrows)} pictures are given for {len(qpos)} rows of qpos; give some for each")
+    return _frames(model, qpos, arrows, camera_path(model, watched, camera), size, caption)
 
 
 def _frames(
     model: mujoco.MjModel,
     qpos: Float[np.ndarray, "t nq"],
+    arrows: Float[np.ndarray, "t n 2 3"],
     path: Sequence[mujoco.MjvCamera],
     size: tuple[int, int],
     caption: str,
@@ -70,13 +76,14 @@ def _frames(
     option.geomgroup[COLLISION_GROUP] = 1  # of links that have no mesh, by studio_model()
     label = _Caption(caption, size) if caption else None
     with open_renderer(shown, *size) as renderer:
-        for row, view in zip(qpos, path, strict=True):
+        for row, drawn, view in zip(qpos, arrows, path, strict=True):
             data.qpos[:] = row
             mujoco.mj_kinematics(shown, data)
             mujoco.mj_comPos(shown, data)
             mujoco.mj_camlight(shown, data)
             renderer.update_scene(data, view, option)
             light_scene(renderer.scene, view)
+            add_arrows(renderer.scene, drawn)
             frame = renderer.render()
             yield label.drawn_on(frame) if label else frame
 

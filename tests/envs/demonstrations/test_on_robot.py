@@ -30,7 +30,7 @@ def allegro():
 
 @pytest.fixture(scope="module")
 def brought(demonstrations, hands, allegro):
-    return on_robot(demonstrations[0], hands[0], allegro)
+    return on_robot(demonstrations[1], hands[1], allegro)
 
 
 def test_least_squares_stay_within_limits():
@@ -43,12 +43,12 @@ def test_least_squares_stay_within_limits():
 
 def test_the_pads_are_those_of_the_pinch(demonstrations, hands):
     """Thumb, index and middle finger; at the grasp on the cube's faces, which they move with from then on."""
-    d = demonstrations[0]
-    pads = demonstrated_pads(d, hands[0])
+    d = demonstrations[1]
+    pads = demonstrated_pads(d, hands[1])
     assert pads.fingers == FINGERS
     centre = d.object_pose[pads.grasp, :3]
     reach = np.linalg.norm(pads.places[pads.grasp] - centre, axis=1)
-    assert (reach > 0.9 * d.object.size[0]).all()
+    assert (reach > 0.7 * d.object.size[0]).all()
     assert (reach < 1.8 * d.object.size[0]).all()
     towards = (centre - pads.places[pads.grasp]) / reach[:, None]
     assert (np.sum(towards * pads.inward, axis=1) > 0.5).all()
@@ -65,7 +65,7 @@ def test_fingers_touch_where_the_persons_do(brought, demonstrations, hands, alle
     data, targets = mujoco.MjData(model), demonstrated_targets(d)
     thing = [g for g in range(model.ngeom) if model.geom_bodyid[g] == model.body(OBJECT).id]
     lifted = np.flatnonzero(d.object_pose[:, 2] - d.object_pose[0, 2] > 0.03)
-    grasp = demonstrated_pads(demonstrations[0], hands[0]).grasp
+    grasp = demonstrated_pads(demonstrations[1], hands[1]).grasp
     for frame in [grasp, *lifted[:: max(len(lifted) // 5, 1)]]:
         data.qpos[:] = np.concatenate([targets[frame], d.object_pose[frame]])
         mujoco.mj_kinematics(model, data)
@@ -73,7 +73,7 @@ def test_fingers_touch_where_the_persons_do(brought, demonstrations, hands, alle
             geoms = [model.geom(c.name).id for c in allegro.contacts if c.finger == finger]
             gap = min(mujoco.mj_geomDistance(model, data, a, b, 0.1, None) for a in geoms for b in thing)
             assert -0.002 < gap < 0.001, (frame, finger)
-    np.testing.assert_array_equal(d.object_pose, demonstrations[0].object_pose)
+    np.testing.assert_array_equal(d.object_pose, demonstrations[1].object_pose)
 
 
 def test_the_hand_moves_smoothly_and_within_its_limits(brought, allegro):
@@ -88,20 +88,20 @@ def test_the_hand_moves_smoothly_and_within_its_limits(brought, allegro):
 
 def test_what_a_robot_cannot_do_is_left_out_with_the_reason(demonstrations, hands, allegro):
     """A hand of which no other finger touches than the thumb; and a cube of ice, which three fingers cannot hold."""
-    d = demonstrations[0]
+    d = demonstrations[1]
     with pytest.raises(LeftOut, match=r"that touch \(thumb, index, middle\) it needs") as left_out:
-        on_robot(d, hands[0], dataclasses.replace(allegro, fingers=("ring", "thumb")))
+        on_robot(d, hands[1], dataclasses.replace(allegro, fingers=("ring", "thumb")))
     assert left_out.value.reason == NO_FINGERS
     ice = replace(d, object=dataclasses.replace(d.object, friction=0.001))
     with pytest.raises(LeftOut, match="no posture of it has force closure") as left_out:
-        on_robot(ice, hands[0], allegro)
+        on_robot(ice, hands[1], allegro)
     assert left_out.value.reason == NO_CLOSURE
 
 
 def test_a_hand_of_the_other_side_is_refused(demonstrations, hands, allegro):
     left = dataclasses.replace(allegro, side="left")
     with pytest.raises(InputError, match="the demonstration is of a right hand, 'allegro' is a left one"):
-        on_robot(demonstrations[0], hands[0], left)
+        on_robot(demonstrations[1], hands[1], left)
 
 
 def test_an_environment_of_a_robot_by_its_name(set_path, brought):
@@ -110,8 +110,8 @@ def test_an_environment_of_a_robot_by_its_name(set_path, brought):
     assert env.action_size == 6 + 16
     length = brought.demonstration.num_frames
     wanted = demonstrated_targets(brought.demonstration)
-    np.testing.assert_allclose(np.asarray(env.reference.targets)[0, :length], wanted, atol=1e-5)
-    held = np.asarray(env.reference.grip)[0, length - 1, 6:]
+    np.testing.assert_allclose(np.asarray(env.reference.targets)[1, :length], wanted, atol=1e-5)
+    held = np.asarray(env.reference.grip)[1, length - 1, 6:]
     assert np.abs(held).max() > 0.01
     with pytest.raises(InputError, match="robot is 'allergo'; valid: ability, allegro"):
         env_of_set(SetSettings("given", folder=str(set_path)), "train", "native", None, set_path, hand="allergo")

@@ -9,6 +9,7 @@ import pytest
 from envs.evaluation.evaluate import Evaluation
 from envs.evaluation.rollout import Rollouts
 from envs.tracking import TrackingEnv
+from mjx_hand.pytree import replace
 from mjx_hand.view.video import video as view_video
 from mjx_hand.view.video.renderer import RendererUnavailable
 from train.experiment.evaluate_seeds import median_and_worst
@@ -35,6 +36,8 @@ def rollouts(env: TrackingEnv) -> Rollouts:
         joints_reference=joints,
         tips=tips,
         tips_reference=tips,
+        contact=np.zeros((count, FRAMES, 16, 6)),
+        needed=np.ones(count),
         counted=counted,
         held=~counted,
         reward=np.zeros((count, FRAMES)),
@@ -65,6 +68,23 @@ def test_demonstration_and_twin_stand_side_by_side(env: TrackingEnv, rollouts: R
     left, right = frames[:, below, :480].astype(int), frames[:, below, 484:].astype(int)
     assert left.std() > 10, "there is something to see"
     assert np.abs(left - right).mean() < 3, "the reference stands beside itself"
+
+
+def test_forces_are_drawn_as_arrows(env: TrackingEnv, rollouts: Rollouts, tmp_path):
+    """A force of 10 N from behind the object changes the twin's pictures, and no others."""
+    contact = rollouts.contact.copy()
+    contact[0, :, 15, :3] = [0.0, 0.0, -10.0]
+    contact[0, :, 15, 3:] = rollouts.object_pose[0, :, :3] + [0, 0, 0.02]
+    films = []
+    for name, forces in (("without", rollouts.contact), ("with", contact)):
+        try:
+            side_by_side(env, replace(rollouts, contact=forces), 0, tmp_path / f"{name}.mp4")
+        except RendererUnavailable as error:
+            pytest.skip(str(error))
+        films.append(frames_of(tmp_path / f"{name}.mp4")[1].astype(int))
+    change = np.abs(films[0] - films[1]).max(axis=-1) > 60
+    assert change[:, :, 484:].sum() > 200
+    assert change[:, :, :480].sum() < 20
 
 
 def scored(errors: list[float], failed: tuple[int, ...] = ()) -> Evaluation:
