@@ -16,12 +16,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from envs.demonstrations.load_set import SEALED
-from envs.grasps import grasp_names
+from envs.grasps import FIVE, grasp_names
 from mjx_hand.errors import InputError
 from train.experiment.evaluate_seeds import shared_folder
 from train.experiments import SEEDS, listed, measure, run_command, taken
 from train.reports.results_page import write_results_page
-from train.reports.results_table import FIVE, Experiment
+from train.reports.results_table import Experiment
 from train.settings.config import Config, compose_seeds
 
 FOLDER = "outputs/results"

@@ -7,7 +7,7 @@ from typing import Any
 from envs.demonstrations.recordings.recording_files import recording_digest
 from envs.demonstrations.recordings.recording_settings import RecordingSettings
 from envs.demonstrations.scripted.simulated_capture import CaptureSettings
-from envs.grasps import grasp_names, grasp_type
+from envs.grasps import FIVE, grasp_names, grasp_type
 from envs.grip_force import RECORDED
 from mjx_hand.errors import InputError
 from mjx_hand.files.digests import json_digest
@@ -24,8 +24,8 @@ class SetSettings:
     """What a demonstration set holds.
 
     Attributes:
-        grasp: name of the grasp type, "all" for a set of each type, "recorded" for what a real recording shows, or
-            "given" for a folder of finished demonstrations, of which nothing is made.
+        grasp: name of the grasp type, "all" for a set of each of the paper's five (`envs.grasps.FIVE`), "recorded" for
+            what a real recording shows, or "given" for a folder of finished demonstrations, of which nothing is made.
         people: random hand shapes in the training part.
         trials: demonstrations of each of them.
         heldout_people, heldout_trials: others, in the held-out part, and the demonstrations of each.
@@ -95,10 +95,10 @@ class SetSettings:
             raise InputError(f"data.seed is {self.seed}; it must not be negative")
 
     def expand_types(self) -> tuple["SetSettings", ...]:
-        """The settings of the single sets that are made: one, one of every grasp type, or none of a given folder."""
+        """The settings of the single sets that are made: one, five of `all`, or none of a given folder."""
         if self.grasp == GIVEN:
             return ()
-        names = grasp_names() if self.grasp == ALL else [self.grasp]
+        names = sorted(FIVE) if self.grasp == ALL else [self.grasp]
         return tuple(dataclasses.replace(self, grasp=name) for name in names)
 
 

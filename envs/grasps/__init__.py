@@ -6,7 +6,10 @@ import pkgutil
 from envs.grasps.grasp_type import Box, Contact, GraspType, Pads, Wrap
 from mjx_hand.errors import InputError
 
-__all__ = ["Box", "Contact", "GraspType", "Pads", "Wrap", "grasp_names", "grasp_type"]
+__all__ = ["FIVE", "Box", "Contact", "GraspType", "Pads", "Wrap", "grasp_names", "grasp_type"]
+
+# The types of arXiv 2512.07359, in its order: what `config=all` and `make results` stand for.
+FIVE = ("power", "pinch", "lateral", "cylindrical", "spherical")
 
 
 def grasp_names() -> list[str]:

@@ -75,8 +75,8 @@ def face_along(
 ) -> tuple[Float[Array, "3"], Float[Array, "3"]]:
     """Where an object's surface is, seen from outside along a direction: the place (m) and the outward normal there.
 
-    Of a simple shape it is the side of the bounding box. Of a mesh it is where the line through `aside` leaves the
-    outermost piece; NaN where it meets none.
+    Of a simple shape it is where a plane across that direction touches it, moved by `aside`. Of a mesh it is where the
+    line through `aside` leaves the outermost piece; NaN where it meets none.
 
     Args:
         kind, size: as in `signed_distance`.
@@ -85,7 +85,7 @@ def face_along(
         planes: of a mesh, those of its pieces (`hull_planes`); of others empty.
     """
     if kind != "mesh":
-        return normal * (jnp.abs(normal) @ half_extents(kind, size)) + aside, normal
+        return normal * _support(kind, size, normal) + aside, normal
     planes = jnp.asarray(planes)
     slope = planes[..., :3] @ normal
     reach = -(planes[..., :3] @ aside + planes[..., 3])  # along the line, times the slope
@@ -97,6 +97,17 @@ def face_along(
     piece = jnp.argmax(out)
     distance = jnp.where(jnp.isfinite(out[piece]), out[piece], jnp.nan)
     return aside + distance * normal, planes[piece, jnp.argmin(leaves[piece]), :3]
+
+
+def _support(kind: str, size: Float[Array, "3"], normal: Float[Array, "3"]) -> Float[Array, ""]:
+    """How far (m) a simple shape reaches along a unit direction."""
+    if kind == "sphere":
+        return size[0]
+    if kind == "capsule":
+        return size[0] + jnp.abs(normal[2]) * size[1]
+    if kind == "cylinder":
+        return _norm(normal[:2]) * size[0] + jnp.abs(normal[2]) * size[1]
+    return jnp.abs(normal) @ size
 
 
 def _norm(v: Float[Array, "*b n"]) -> Float[Array, "*b"]:

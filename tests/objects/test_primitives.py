@@ -6,7 +6,7 @@ import trimesh
 from scipy.optimize import minimize
 
 from mjx_hand.errors import InputError
-from mjx_hand.objects.primitives import half_extents, signed_distance
+from mjx_hand.objects.primitives import face_along, half_extents, signed_distance
 
 SIZES = {
     "box": (0.02, 0.03, 0.015),
@@ -96,3 +96,23 @@ def test_an_unknown_kind_is_refused():
 def test_a_mesh_without_planes_is_told_what_it_needs():
     with pytest.raises(InputError, match=r"a mesh needs the planes of its convex pieces: planes=hull_planes\("):
         signed_distance("mesh", jnp.ones(3), jnp.zeros(3))
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "normal"),
+    [
+        ("box", (0.02, 0.03, 0.04), (0.0, -1.0, 0.0)),
+        ("sphere", (0.02, 0.0, 0.0), (0.48, 0.6, -0.64)),
+        ("cylinder", (0.02, 0.05, 0.0), (0.6, -0.8, 0.0)),
+        ("cylinder", (0.02, 0.05, 0.0), (0.0, 0.0, -1.0)),
+        ("capsule", (0.02, 0.05, 0.0), (0.6, 0.8, 0.0)),
+        ("capsule", (0.02, 0.05, 0.0), (0.0, 0.0, 1.0)),
+    ],
+)
+def test_what_is_touched_along_a_direction_is_on_the_surface_and_faces_it(kind, size, normal):
+    size, normal = jnp.array(size), jnp.array(normal)
+    place, outwards = face_along(kind, size, normal, jnp.zeros(3), np.zeros((0, 0, 4)))
+    np.testing.assert_allclose(signed_distance(kind, size, place), 0.0, atol=1e-6)
+    np.testing.assert_array_equal(outwards, normal)
+    beyond = place + 0.01 * normal
+    np.testing.assert_allclose(jax.grad(lambda p: signed_distance(kind, size, p))(beyond), normal, atol=1e-5)

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from envs.evaluation.failure import FAILURES
+from envs.grasps import FIVE
 from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
 from train import experiments, results
@@ -17,7 +18,7 @@ from train.ppo import _write_curve
 from train.reports.evaluation_record import evaluation_fingerprint
 from train.reports.published import PAPER
 from train.reports.results_page import write_results_page
-from train.reports.results_table import FIVE, Experiment, failures_table, results_table
+from train.reports.results_table import Experiment, failures_table, results_table
 from train.reports.stress_summary import stress_summary
 from train.settings.config import Config
 from train.settings.options import Checks, Ppo

@@ -34,7 +34,9 @@ _TYPES = {
 }
 
 
-def scene_xml(demonstration: Demonstration, hand: RigidHand | Body, contacts: str = "object", forces: bool = False) -> str:
+def scene_xml(
+    demonstration: Demonstration, hand: RigidHand | Body, contacts: str = "object", forces: bool = False
+) -> str:
     """The scene, with the native engine's solver, in one file; the rest as `envs.scene.scene_spec` has it."""
     spec = demonstration_spec(demonstration, hand, contacts=contacts, forces=forces)
     (solved,) = gauss_seidel([spec.compile()])

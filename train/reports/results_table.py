@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from envs.grasps import FIVE
 from mjx_hand.view.report import Table
 from train.experiment.evaluate_seeds import POLICY, PRESS, REPLAY, ZERO
 from train.learning.curve import LEARNED, Point, minutes_to_learn
 from train.reports.published import PAPER, Published
 from train.reports.score_table import score_text, share_text
-
-FIVE = tuple(name for name in PAPER if name != "all")  # grasp types, of which "all" is the mean
 
 
 @dataclasses.dataclass(frozen=True)

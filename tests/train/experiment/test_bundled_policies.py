@@ -9,6 +9,7 @@ import pytest
 import train.experiment.bundled_policies
 from envs.evaluation.evaluate import evaluate
 from envs.evaluation.roll_out import make_roll_out, zero_residual
+from envs.grasps import FIVE
 from mjx_hand.errors import InputError
 from mjx_hand.player.features import OBSERVATION_LIMIT
 from tools import bundle_policy
@@ -18,7 +19,6 @@ from train.learning.checkpoint import load_checkpoint
 from train.learning.curve import Point
 from train.learning.policy import deterministic_policy
 from train.play import viewer
-from train.reports.results_table import FIVE
 from train.settings.config import Config, compose
 from train.settings.options import Play
 
