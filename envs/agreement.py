@@ -32,6 +32,7 @@ class Limits:
     gripped: Mapping[float, float]
 
 
+# MJX's where the hand does not meet itself: of capsules side by side it finds one contact, the C engine two.
 # Four worlds in contact, whose paths part from rounding on: how far differs from grasp to grasp.
 LIMITS = {
     "mjx": Limits(free=2e-5, gripped={0.5: 1e-3, 1.0: 5e-3}),

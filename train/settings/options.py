@@ -23,7 +23,7 @@ class Ppo:
         initial_std: standard deviation of actions at first; a residual of 1 is the task's full range.
     """
 
-    num_updates: int = 300
+    num_updates: int = 400
     num_timesteps: int | None = None
     num_envs: int = 256
     unroll_length: int = 16

@@ -63,7 +63,7 @@ def add_arrows(scene: mujoco.MjvScene, arrows: Float[np.ndarray, "n 2 3"]) -> No
         geom = scene.geoms[scene.ngeom]
         kind = mujoco.mjtGeom.mjGEOM_ARROW
         mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), np.array(_ARROW))
-        mujoco.mjv_connector(geom, kind, _ARROW_WIDTH, start, end)
+        mujoco.mjv_connector(geom, kind, _ARROW_WIDTH, start, 2 * end - start)  # it is drawn half as long as asked for
         geom.category = mujoco.mjtCatBit.mjCAT_DECOR
         scene.ngeom += 1
 

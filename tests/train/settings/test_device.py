@@ -81,7 +81,7 @@ def test_the_command_refuses_a_gpu_that_is_not_here_in_one_line(tmp_path):
 
 @pytest.mark.parametrize(
     ("given", "updates"),
-    [({}, 300), ({"num_updates": 9}, 9), ({"num_timesteps": 600_000}, 147), ({"num_timesteps": 1}, 1)],
+    [({}, 400), ({"num_updates": 9}, 9), ({"num_timesteps": 600_000}, 147), ({"num_timesteps": 1}, 1)],
 )
 def test_a_budget_is_in_updates_or_in_steps(given, updates):
     assert Ppo(**given).budget == updates

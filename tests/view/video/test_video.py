@@ -70,6 +70,26 @@ def test_shadows_fall_on_the_table(frames):
     assert floor.sum(axis=-1).min() < 0.7 * np.median(floor.sum(axis=-1))
 
 
+def test_arrows_reach_from_where_to_where():
+    """Forth and back an arrow covers the same columns, which it would not if it ended early; one of NaN is not drawn."""
+    ends = np.array([[-0.08, 0.0, 0.15], [0.08, 0.0, 0.15]])
+    asked = {"none": np.full((2, 3), np.nan), "forth": ends, "back": ends[::-1]}
+    camera = Camera(azimuth=90.0)
+    seen = {
+        name: next(render_frames(scene(), way(1), camera, arrows=arrow[None, None], size=SIZE)).astype(int)
+        for name, arrow in asked.items()
+    }
+    plain = next(render_frames(scene(), way(1), camera, size=SIZE)).astype(int)
+    np.testing.assert_array_equal(seen["none"], plain)
+    blue = {name: (seen[name][..., 2] - seen[name][..., 0] > 60) & (seen[name] != plain).any(-1) for name in asked}
+    columns = [np.flatnonzero(blue[name].any(axis=0)) for name in ("forth", "back")]
+    assert np.ptp(columns[0]) > 30
+    for one, other in zip(*((c.min(), c.max()) for c in columns), strict=True):
+        assert abs(one - other) <= 3
+    with pytest.raises(InputError, match="arrows of 2 pictures are given for 1 rows of qpos"):
+        render_frames(scene(), way(1), arrows=np.zeros((2, 1, 2, 3)), size=SIZE)
+
+
 def test_the_model_is_left_as_it_is():
     model, untouched = scene(), scene()
     next(render_frames(model, way(), size=SIZE)).sum()
