@@ -27,7 +27,7 @@ def render_frames(
     camera: Camera | None = None,
     *,
     watched: Float[np.ndarray, "_ _"] | None = None,
-    arrows: Float[np.ndarray, "t n 2 3"] | None = None,
+    arrows: Float[np.ndarray, "_ _ 2 3"] | None = None,
     size: tuple[int, int] = (640, 480),
     caption: str = "",
 ) -> Generator[Frame, None, None]:

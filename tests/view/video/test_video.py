@@ -71,7 +71,7 @@ def test_shadows_fall_on_the_table(frames):
 
 
 def test_arrows_reach_from_where_to_where():
-    """Forth and back an arrow covers the same columns, which it would not if it ended early; one of NaN is not drawn."""
+    """Forth and back it covers the same columns, which it would not if it ended early; one of NaN is not drawn."""
     ends = np.array([[-0.08, 0.0, 0.15], [0.08, 0.0, 0.15]])
     asked = {"none": np.full((2, 3), np.nan), "forth": ends, "back": ends[::-1]}
     camera = Camera(azimuth=90.0)
