@@ -47,7 +47,7 @@ def scene_xml(env: TrackingEnv) -> str:
     """The MJCF of the environment's scenes, which are alike but for numbers, as MuJoCo 3 reads it too."""
     most = max(range(len(env.demonstrations)), key=lambda k: len(env.demonstrations[k].support))
     d = env.demonstrations[most]
-    spec = demonstration_spec(d, env.hands[most], contacts=env.task.contacts)
+    spec = demonstration_spec(d, env.hands[most], contacts=env.task.contacts, forces=True)
     spec.compile()
     return spec.to_xml().replace(_INPUT, "")
 

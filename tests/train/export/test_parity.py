@@ -52,7 +52,7 @@ def wanted(included: Config, inputs: Rows, policy: ExportedPolicy) -> tuple[Rows
     observation = np.clip((inputs - policy.offset) * policy.scale, -5, 5)
     act = deterministic_policy(included.ppo, 225, 26)
     action = np.clip(np.asarray(jax.jit(act)(parameters, observation)), -1, 1)
-    scale = np.repeat([0.02, 0.10, 0.35], [3, 3, 20])
+    scale = np.repeat([0.02, 0.2, 0.7], [3, 3, 20])
     return action, 0.9 * inputs[:, 52:78] + 0.1 * scale * action
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from envs.evaluation.evaluate import Evaluation
-from envs.grasps import grasp_names
+from envs.grasps import FIVE
 from mjx_hand.errors import InputError
 from train.reports.published import PAPER
 from train.reports.type_table import type_scores, type_table
@@ -45,7 +45,7 @@ def test_the_mean_is_over_types_however_many_demonstrations_each_has():
 
 def test_the_papers_mean_over_all_types_is_what_it_says():
     every = evaluation(list(range(5)), [True] * 5, [0.5] * 5)
-    *_, mean = type_table({"policy": [every]}, grasp_names()).rows
+    *_, mean = type_table({"policy": [every]}, FIVE).rows
     assert mean[1:] == (
         "100.0 %, 0.50 cm",
         f"{100 * PAPER['all'].success:.1f} %, {PAPER['all'].tracking_error_cm} cm",
