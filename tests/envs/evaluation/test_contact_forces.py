@@ -47,7 +47,7 @@ def test_both_sides_of_a_grip_count():
 def test_arrows_end_where_links_touch():
     arrows = contact_arrows(pressed(6.0), 0, np.array([0, 5]))
     assert arrows.shape == (2, 16, 2, 3)
-    drawn = np.isfinite(arrows).all(axis=(2, 3))
+    drawn = np.asarray(np.isfinite(arrows).all(axis=(2, 3)))
     np.testing.assert_array_equal(np.flatnonzero(drawn[1]), [3, 15])
     np.testing.assert_allclose(arrows[1, 3], [[-0.02 - 6 * PER_NEWTON, 0, 0.05], [-0.02, 0, 0.05]])
 

@@ -219,6 +219,9 @@ def test_warp_agrees_with_mujoco_world_by_world(env, family, rollout_inputs, nat
     demos, qpos, qvel, controls, pinching = rollout_inputs
     found = roll(demos, qpos, qvel, controls)
     assert departure(found, native_roll, pinching).complaints(LIMITS["warp"]) == []
+    forces, wanted = (np.asarray(roll.contact)[0, ..., :3] for roll in (found, native_roll))
+    assert np.linalg.norm(wanted[pinching], axis=-1).max() > 1.0
+    np.testing.assert_allclose(forces, wanted, atol=0.1)
     assert_resets_only(roll, rollout_inputs)
     assert_refuses_bad_starts(engine, rollout_inputs)
     # Other hands and objects: as the C engine has them, and not as the first model.
