@@ -2,15 +2,19 @@
 
     python -m tools.bundle_policy config=pinch seed=1
 
-writes it, and its held-out demonstration of median tracking error, into train/policies.
+writes it, and a held-out demonstration, into train/policies: of those that are lost without a policy the one of median
+tracking error.
 """
 
 import dataclasses
 from pathlib import Path
 
+import numpy as np
+
+from envs.evaluation.evaluate import evaluate_in
+from envs.evaluation.roll_out import make_roll_out, zero_residual
 from mjx_hand.motion.demonstration import Demonstration, save_demonstration
 from train.experiment import bundled_policies
-from train.experiment.evaluate_seeds import median_and_worst
 from train.experiment.setup import load_env, rolled_out, settled
 from train.learning.checkpoint import Checkpoint, save_checkpoint
 from train.settings.config import Config, command
@@ -28,7 +32,11 @@ def main(config: Config) -> None:
     """Choose the demonstration and write."""
     env = load_env(config, "heldout")
     checkpoint, _, scores = rolled_out(config, env)
-    _, median = median_and_worst({config.seed: scores})["median"]
+    idle = evaluate_in(env, make_roll_out(env, zero_residual)(None))
+    lost = np.flatnonzero(~idle.scores["manip_trans_object"])
+    lost = lost if len(lost) else np.arange(len(env.demonstrations))
+    errors = scores.scores["tracking_error_cm"][lost]
+    median = int(lost[np.argsort(errors, kind="stable")[len(errors) // 2]])
     for path in include(checkpoint, env.demonstrations[median], config.name):
         print(f"{path}: {path.stat().st_size / 1000:.0f} kB")
 

@@ -154,7 +154,7 @@ def test_mjx_counts_the_forces_that_the_c_engine_senses(mjx_engine, mjx_roll, ro
     assert np.linalg.norm(wanted[pinching][..., :3], axis=-1).max() > 1.0
     assert force.max() < 1.0
     assert force[force > 0].mean() < 0.1
-    assert place[np.linalg.norm(wanted[..., :3], axis=-1) > 0.1].max() < 5e-4
+    assert place[np.linalg.norm(wanted[..., :3], axis=-1) > 0.1].max() < 2e-3
 
 
 def test_mjx_keeps_fingers_apart_about_as_mujoco_does(env, mjx_engine, rollout_inputs):
