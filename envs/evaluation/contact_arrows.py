@@ -1,7 +1,7 @@
 """The forces on an object as arrows, for pictures."""
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float, Int
 
 from envs.evaluation.rollout import Rollouts
 
@@ -9,9 +9,7 @@ PER_NEWTON = 0.005  # m: an arrow of 5 cm is 10 N
 _LEAST = 0.05  # N, below which no arrow is drawn
 
 
-def contact_arrows(
-    rollouts: Rollouts, index: int, frames: Bool[np.ndarray, "all"] | np.ndarray
-) -> Float[np.ndarray, "t touching 2 3"]:
+def contact_arrows(rollouts: Rollouts, index: int, frames: Int[np.ndarray, "t"]) -> Float[np.ndarray, "t touching 2 3"]:
     """From where to where (m, world) an arrow for each link's force goes, in these frames of rollout `index`.
 
     Arrows end where the link touches, so that they stand outside of the object; NaN for a link that does not touch.
