@@ -22,9 +22,9 @@ def grip_force_of(mass: float, friction: float, share: float = 1.0) -> float:
 
 
 def least_contact_force(model: mujoco.MjModel) -> float:
-    """The least sum of the sizes of contact forces (N) that carries a scene's object by its upright faces.
+    """The least sum of contact forces' magnitudes (N) that carries a scene's object by its upright faces.
 
-    A contact's normal force N bears μ N, so that m g needs N = m g / μ of all together, of the size N sqrt(1 + μ²).
+    A contact's normal force N bears μ N, so that all together need N = m g / μ, of the magnitude N sqrt(1 + μ²).
     """
     friction = model.geom_friction[model.geom_bodyid == model.body(OBJECT).id, 0].max()
     return float(model.body(OBJECT).mass[0] * _GRAVITY * np.hypot(1.0, friction) / friction)

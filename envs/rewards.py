@@ -27,7 +27,7 @@ class TrackedStep:
         action: what the policy did, from -1 to 1.
         change: of the filtered action, residual over its scale, since the step before.
         forces: what each link presses the object with (N, world).
-        needed: the least sum of their sizes (N) that carries the object by upright faces.
+        least_force: the least sum of their magnitudes (N) that carries the object by upright faces.
     """
 
     position: Float[Array, ""]
@@ -41,7 +41,7 @@ class TrackedStep:
     action: Float[Array, "u"]
     change: Float[Array, "u"]
     forces: Float[Array, "links 3"]
-    needed: Float[Array, ""]
+    least_force: Float[Array, ""]
 
 
 Value = Callable[[TrackedStep], Float[Array, ""]]
@@ -113,8 +113,8 @@ def action_rate(step: TrackedStep) -> Float[Array, ""]:
 @cost(0.0)
 def grip_force(step: TrackedStep) -> Float[Array, ""]:
     """By how much the links' forces on the object exceed what its weight needs, over that."""
-    total = jnp.sum(jnp.sqrt(jnp.sum(step.forces**2, axis=-1) + 1e-9))  # N^2, where the size has no derivative
-    return jnp.maximum(total / step.needed - 1.0, 0.0)
+    total = jnp.sum(jnp.sqrt(jnp.sum(step.forces**2, axis=-1) + 1e-9))  # N^2, where the magnitude has no derivative
+    return jnp.maximum(total / step.least_force - 1.0, 0.0)
 
 
 def _check_weights(weights: "RewardWeights") -> None:

@@ -99,7 +99,7 @@ class TrackingEnv(Env):
         self.tables = Tables(
             reference=reference,
             starts=starts,
-            needed=jnp.array([least_contact_force(model) for model in self.engine.models], jnp.float32),
+            least_force=jnp.array([least_contact_force(model) for model in self.engine.models], jnp.float32),
             inertia=jnp.array([[m.body(OBJECT).mass[0], m.body(OBJECT).inertia.mean()] for m in self.models]),
             low=limits[:, 0],
             high=limits[:, 1],
@@ -266,7 +266,7 @@ class TrackingEnv(Env):
             action=action,
             change=moved / residual_scale(self.task, self.body.names, self.body.reach),
             forces=twin.physics.contact[:, :3],
-            needed=self.tables.needed[twin.physics.variant],
+            least_force=self.tables.least_force[twin.physics.variant],
         )
 
     def _errors(self, twin: Twin) -> tuple[Array, Array]:

@@ -35,7 +35,7 @@ class Tables:
     Attributes:
         reference: the demonstrations and their controls.
         starts: the engine's state at every frame of every demonstration.
-        needed: least sum of contact forces (N) that carries the object, of each of the engine's scenes.
+        least_force: least sum of contact forces (N) that carries the object, of each of the engine's scenes.
         inertia: mass (kg) and mean moment of inertia (kg m2) of each demonstration's object.
         low, high: limits of the targets (m, rad).
         engine: the engine's own (`Engine.tables`).
@@ -44,7 +44,7 @@ class Tables:
 
     reference: Reference
     starts: PhysicsState
-    needed: Float[Array, "v"]
+    least_force: Float[Array, "v"]
     inertia: Float[Array, "d 2"]
     low: Float[Array, "u"]
     high: Float[Array, "u"]

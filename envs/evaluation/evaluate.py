@@ -79,14 +79,15 @@ def evaluate(
         scores["hold"] = metrics.hold(rollouts, palm)
     scores["kept"] = scores["chord"] & scores.get("hold", True)
     turned, moving = np.rad2deg(metrics.rotation_error(rollouts)), metrics.moving(rollouts)
+    grip = metrics.over(metrics.grip_force(rollouts), moving)
     scores |= {
         "tracking_error_cm": metrics.tracking_error(rollouts),
         "moving_error_cm": 100 * metrics.over(metrics.position_error(rollouts), moving),
         "object_rotation_error_deg": metrics.over_counted(turned, rollouts),
         "moving_rotation_error_deg": metrics.over(turned, moving),
         "joint_error_cm": 100 * metrics.over_counted(metrics.joint_error(rollouts), rollouts),
-        "grip_force_newton": metrics.over(metrics.grip_force(rollouts), moving),
-        "grip_force_ratio": metrics.over(metrics.grip_force(rollouts), moving) / rollouts.needed,
+        "grip_force_newton": grip,
+        "grip_force_ratio": grip / rollouts.least_force,
         "tip_error_cm": 100 * metrics.over_counted(metrics.tip_error(rollouts), rollouts),
     }
     return Evaluation(

@@ -56,7 +56,7 @@ def tip_error(rollouts: Rollouts) -> Float[np.ndarray, "n t"]:
 
 
 def grip_force(rollouts: Rollouts) -> Float[np.ndarray, "n t"]:
-    """Sum (N) of the sizes of the links' forces on the object, frame by frame."""
+    """Sum (N) of the magnitudes of the links' forces on the object, frame by frame."""
     return np.linalg.norm(rollouts.contact[..., :3], axis=-1).sum(axis=-1)
 
 

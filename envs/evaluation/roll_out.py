@@ -58,7 +58,7 @@ def make_roll_out(
         start = (physics.qpos, physics.sensordata, physics.contact, first.reward)
         _, rest = jax.lax.scan(step, first, length=steps)
         frames = jax.tree.map(lambda a, b: jnp.moveaxis(jnp.concatenate([a[None], b]), 0, 1), start, rest)
-        return frames, tables.needed[physics.variant]
+        return frames, tables.least_force[physics.variant]
 
     # After a demonstration its last frame is the reference.
     frame = np.minimum(np.arange(steps + 1)[None], length[:, None] - 1)
@@ -72,7 +72,7 @@ def make_roll_out(
     held = (time >= length[:, None]) & (time < length[:, None] + round(hold * env.fps))
 
     def roll_out(parameters: object, tables: Tables | None = None) -> Rollouts:
-        (qpos, sensors, contact, reward), needed = run(parameters, env.tables if tables is None else tables)
+        (qpos, sensors, contact, reward), least_force = run(parameters, env.tables if tables is None else tables)
         joints, _ = places(qpos[..., :hand])
         return Rollouts(
             demonstration=which,
@@ -84,7 +84,7 @@ def make_roll_out(
             tips=np.asarray(sensors).reshape(*sensors.shape[:2], -1, 3),
             tips_reference=wanted_tips,
             contact=np.asarray(contact),
-            needed=np.asarray(needed),
+            least_force=np.asarray(least_force),
             counted=counted,
             held=held,
             reward=np.asarray(reward),

@@ -20,7 +20,7 @@ class Rollouts:
         joints, joints_reference: joint centres, the wrist first.
         tips, tips_reference: finger tips.
         contact: how each link pressed the object in the step that led to each frame: force (N) on it, and where (m).
-        needed: least sum of the sizes of such forces (N) that carries each rollout's object by upright faces.
+        least_force: least sum of such forces' magnitudes (N) that carries each rollout's object by upright faces.
         counted, held: frame masks.
         reward: of the step that led to each frame.
         fps: control rate.
@@ -35,7 +35,7 @@ class Rollouts:
     tips: Float[np.ndarray, "n t tips 3"]
     tips_reference: Float[np.ndarray, "n t tips 3"]
     contact: Float[np.ndarray, "n t touching 6"]
-    needed: Float[np.ndarray, "n"]
+    least_force: Float[np.ndarray, "n"]
     counted: Bool[np.ndarray, "n t"]
     held: Bool[np.ndarray, "n t"]
     reward: Float[np.ndarray, "n t"]

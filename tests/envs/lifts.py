@@ -31,7 +31,7 @@ def lift(frames: int = 40, held: int = 0, rows: int = 1) -> Rollouts:
         tips=tips,
         tips_reference=tips.copy(),
         contact=np.zeros((rows, total, 16, 6)),
-        needed=np.ones(rows),
+        least_force=np.ones(rows),
         counted=np.tile(counted, (rows, 1)),
         held=np.tile(~counted, (rows, 1)),
         reward=np.zeros((rows, total)),

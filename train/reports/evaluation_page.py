@@ -1,6 +1,6 @@
 """An evaluation as tables, figures and videos, and the page that holds them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 import jax
@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from envs.evaluation.evaluate import Evaluation
 from envs.evaluation.metrics import grip_force, position_error
 from envs.evaluation.people import people_of, person_scores
+from envs.evaluation.rollout import Rollouts
 from mjx_hand.view.figures import plots
 from mjx_hand.view.report import Film, Headline, Plot, Report, Section, Table
 from train.experiment.evaluate_seeds import (
@@ -38,8 +39,8 @@ from train.view.video import film
 TRACKING = "Distance of the object from where the demonstration has it."
 
 FORCE = (
-    "Sum of the sizes of the links' forces on the object, over m g sqrt(1 + μ²) / μ, the least that carries it by its "
-    "upright faces."
+    "Sum of the magnitudes of the links' forces on the object, over m g sqrt(1 + μ²) / μ, the least that carries it by "
+    "its upright faces."
 )
 
 
@@ -89,26 +90,28 @@ def pressed(results: Results) -> str:
 
 def tracking_plot(results: Mapping[int, Results]) -> Figure:
     """Tracking error over time of the policy, all seeds together, and the baselines."""
-    first = next(iter(results.values()))
-    every = [result.rollouts[POLICY] for result in results.values()]
-    together = np.concatenate([100 * position_error(r) for r in every])
-    errors = {POLICY: (together, np.concatenate([r.counted for r in every]))}
-    errors |= {t: (100 * position_error(first.rollouts[t]), first.rollouts[t].counted) for t in BASELINES}
-    return plots.error_over_time(first.env.fps, errors, limit=3.0)
+    errors = _over_time(results, BASELINES, lambda rollouts: 100 * position_error(rollouts))
+    return plots.error_over_time(next(iter(results.values())).env.fps, errors, limit=3.0)
 
 
 def force_plot(results: Mapping[int, Results]) -> Figure:
     """Grip force over time, over the least that carries the object: the policy, all seeds together, and the press."""
+    ratios = _over_time(results, [PRESS], lambda rollouts: grip_force(rollouts) / rollouts.least_force[:, None])
+    fps = next(iter(results.values())).env.fps
+    return plots.error_over_time(fps, ratios, label="grip force / least", limit=1.0, limit_label="carries")
+
+
+def _over_time(
+    results: Mapping[int, Results], baselines: Iterable[str], value: Callable[[Rollouts], np.ndarray]
+) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """A value of each frame, and which frames count: of the policy's rollouts with all seeds, and of the baselines'."""
     first = next(iter(results.values()))
-    chosen = {POLICY: [r.rollouts[POLICY] for r in results.values()], PRESS: [first.rollouts[PRESS]]}
-    ratios = {
-        title: (
-            np.concatenate([grip_force(r) / r.needed[:, None] for r in each]),
-            np.concatenate([r.counted for r in each]),
-        )
+    chosen = {POLICY: [result.rollouts[POLICY] for result in results.values()]}
+    chosen |= {title: [first.rollouts[title]] for title in baselines}
+    return {
+        title: (np.concatenate([value(r) for r in each]), np.concatenate([r.counted for r in each]))
         for title, each in chosen.items()
     }
-    return plots.error_over_time(first.env.fps, ratios, label="grip force / least", limit=1.0, limit_label="carries")
 
 
 def films(results: Mapping[int, Results], folder: Path) -> dict[str, Film]:

@@ -35,7 +35,7 @@ def pressed(force: float):
     contact = np.zeros_like(rollouts.contact)
     contact[..., 3, :] = [force, 0, 0, -0.02, 0, 0.05]
     contact[..., 15, :] = [-force, 0, 0, 0.02, 0, 0.05]
-    return dataclasses.replace(rollouts, contact=contact, needed=np.array([4.0]))
+    return dataclasses.replace(rollouts, contact=contact, least_force=np.array([4.0]))
 
 
 def test_both_sides_of_a_grip_count():
@@ -54,16 +54,16 @@ def test_arrows_end_where_links_touch():
 
 def test_no_grip_that_carries_is_weaker_than_the_least(gripping, rollouts):
     """Of the frames in which the object is off the ground and moves evenly."""
-    np.testing.assert_allclose(rollouts.needed, [least_contact_force(m) for m in gripping.models], rtol=1e-6)
+    np.testing.assert_allclose(rollouts.least_force, [least_contact_force(m) for m in gripping.models], rtol=1e-6)
     model = gripping.models[0]
     mass, friction = model.body(OBJECT).mass[0], float(gripping.demonstrations[0].object.friction)
-    assert rollouts.needed[0] == pytest.approx(9.81 * mass / np.sin(np.arctan(friction)))
+    assert rollouts.least_force[0] == pytest.approx(9.81 * mass / np.sin(np.arctan(friction)))
     height = rollouts.object_pose[..., 2] - rollouts.object_pose[:, :1, 2]
     speed = np.gradient(rollouts.object_pose[..., :3], 1 / rollouts.fps, axis=1)
     even = np.linalg.norm(np.gradient(speed, 1 / rollouts.fps, axis=1), axis=-1) < 0.3
     carried = rollouts.counted & (height > 0.03) & even
     assert carried.sum() > 20
-    assert (grip_force(rollouts) / rollouts.needed[:, None])[carried].min() > 0.9
+    assert (grip_force(rollouts) / rollouts.least_force[:, None])[carried].min() > 0.9
 
 
 def test_a_held_object_is_carried_by_the_forces_on_it(gripping, rollouts):
@@ -81,5 +81,7 @@ def test_force_beyond_what_the_weight_needs_costs(gripping, rollouts):
     state = jax.jit(gripping.start)(jnp.asarray(0, jnp.int32), jnp.asarray(150, jnp.int32))
     state = jax.jit(gripping.step)(state, jnp.zeros(26))
     total = np.linalg.norm(np.asarray(state.pipeline_state.physics.contact)[:, :3], axis=-1).sum()
-    assert total > rollouts.needed[0]
-    assert float(state.metrics["reward/grip_force"]) == pytest.approx(-0.5 * (total / rollouts.needed[0] - 1), rel=1e-3)
+    assert total > rollouts.least_force[0]
+    assert float(state.metrics["reward/grip_force"]) == pytest.approx(
+        -0.5 * (total / rollouts.least_force[0] - 1), rel=1e-3
+    )

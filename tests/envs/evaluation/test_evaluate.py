@@ -54,7 +54,7 @@ def test_frames_that_are_not_counted_never_matter():
     clean = carried(0.01)
     frames = clean.counted.shape[1]
     padding = 30
-    padded = {"fps": FPS, "demonstration": clean.demonstration, "needed": clean.needed}
+    padded = {"fps": FPS, "demonstration": clean.demonstration, "least_force": clean.least_force}
     for field in dataclasses.fields(Rollouts):
         values = getattr(clean, field.name)
         if field.name not in padded:

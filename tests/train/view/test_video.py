@@ -37,7 +37,7 @@ def rollouts(env: TrackingEnv) -> Rollouts:
         tips=tips,
         tips_reference=tips,
         contact=np.zeros((count, FRAMES, 16, 6)),
-        needed=np.ones(count),
+        least_force=np.ones(count),
         counted=counted,
         held=~counted,
         reward=np.zeros((count, FRAMES)),
