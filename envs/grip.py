@@ -4,6 +4,10 @@ A recording shows where fingers are, not how hard they press: replayed alone it 
 from the demonstration and the object's shape alone, without simulation. Added to the reference they hold some objects
 for some time; the policy's residual does the rest.
 
+A hand that wraps an object closes instead: its phalanges touch all around, where J^T f of a push along the surface's
+normal hardly turns a joint, and what holds is that every flexing joint pulls. On held-out demonstrations of the three
+types that wrap, J^T f holds at most 5 % by itself, whatever the force, half of the joints' torque 68 to 98 %.
+
 The same press is computed in two more places, each from other contacts: `envs.model_grip` for any body from the C
 engine's distances between its geoms, which are no capsules, and `envs.live.twin.grip` for one state in real time from
 the engine's own list of contacts. What trained policies rely on is this one, to the bit.
@@ -14,7 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from mjx_hand.hand.joints import FINGERS, LINKS
+from mjx_hand.hand.joints import FINGERS, HINGES, LINKS
 from mjx_hand.objects.primitives import signed_distance
 from mjx_hand.rigid.capsules import capsule_points
 from mjx_hand.rigid.gains import Gains
@@ -23,6 +27,8 @@ from mjx_hand.rigid.rigid_hand import RigidHand
 _NEAR = 0.007  # m: a phalanx whose skin is closer than this is taken to touch
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
 _ALONG = np.linspace(0.0, 1.0, 5)
+_WRAPS = 6.0  # of the fingers' twelve phalanges: with more that touch a hand wraps; a pinch has up to 5
+_FLEXES = np.array([name.endswith("_flexion") for name in HINGES])
 
 
 def grip_offsets(
@@ -34,6 +40,7 @@ def grip_offsets(
     force: float | Float[Array, ""],
     gains: Gains,
     planes: Float[Array, "h f 4"] | None = None,
+    wrap_torque: float = 0.0,
 ) -> Float[Array, "t j"]:
     """Hinge offsets (rad) that put each touching phalanx on the object's surface and press it there.
 
@@ -52,6 +59,8 @@ def grip_offsets(
         force: newtons.
         gains: of the position controllers that the offsets are given to.
         planes: of a mesh (`mjx_hand.objects.primitives.hull_planes`).
+        wrap_torque: share of its torque limit with which every flexing joint closes in place of all that, while more
+            than half of the fingers' phalanges touch; with 0 a hand that wraps presses like any other.
     """
     pads = jnp.array([k for k, link in enumerate(rigid.capsule_links) if link > 0])
     links = [LINKS[link] for link in rigid.capsule_links if link > 0]
@@ -84,6 +93,10 @@ def grip_offsets(
         rows_of_gap = jnp.einsum("cak,ca->ck", jacobian, inward) * touching[:, None]
         square = rows_of_gap @ rows_of_gap.T + _DAMPING**2 * jnp.eye(len(links))
         closing = rows_of_gap.T @ jnp.linalg.solve(square, gap * touching)
-        return closing + jnp.clip(torque, -limit, limit) / stiffness
+        pressing = closing + jnp.clip(torque, -limit, limit) / stiffness
+        if not wrap_torque:
+            return pressing
+        wraps = jax.nn.sigmoid((jnp.sum(phalanges * ~thumb) - _WRAPS) / 0.3)
+        return (1 - wraps) * pressing + wraps * wrap_torque * limit * _FLEXES / stiffness
 
     return jax.lax.map(lambda row: one(*row), (angles, *object_in_hand), batch_size=64)

@@ -63,6 +63,7 @@ def make_reference(
     hands: Sequence[RigidHand | Body],
     *,
     grip_force: float | None,
+    wrap_torque: float = 0.0,
     gains: Gains,
 ) -> Reference:
     """Stack demonstrations and work out their controls.
@@ -72,6 +73,7 @@ def make_reference(
         hands: the twin's hand for each.
         grip_force: of all (N); 0 replays them as they are, None takes that of each one's grasp type, or what the weight
             of a recorded object asks for.
+        wrap_torque: share of the torque limits with which human hands that wrap close (`envs.grip.grip_offsets`).
         gains: of the hand's position controllers.
 
     Raises:
@@ -87,7 +89,7 @@ def make_reference(
         bases.append(base_rotation(d))
         approach.append(padded(approach_weights(np.asarray(d.object_pose), d.motion.fps), frames))
     targets = jnp.asarray(np.stack(targets), jnp.float32)
-    grip = grip_table(demonstrations, hands, targets, np.where(forces > 0, forces, np.nan), gains)
+    grip = grip_table(demonstrations, hands, targets, np.where(forces > 0, forces, np.nan), gains, wrap_torque)
     features = [[*d.object.size, d.object.mass, d.object.friction, *_one_of_kinds(d)] for d in demonstrations]
     return Reference(
         targets=targets,
@@ -113,16 +115,18 @@ def cached_reference(
     demonstrations: Sequence[Demonstration],
     hands: Sequence[RigidHand | Body],
     grip_force: float | None,
+    wrap_torque: float,
     gains: Gains,
 ) -> Reference:
     """`make_reference`, kept on disk."""
 
     def compute() -> dict[str, np.ndarray]:
-        made = make_reference(demonstrations, hands, grip_force=grip_force, gains=gains)
+        made = make_reference(demonstrations, hands, grip_force=grip_force, wrap_torque=wrap_torque, gains=gains)
         return {field.name: np.asarray(getattr(made, field.name)) for field in dataclasses.fields(made)}
 
     bare = [_ingredient(hand) for hand in hands]
-    arrays = cached(compute, list(demonstrations), bare, grip_force, dataclasses.astuple(gains), RECORDED_RAMP)
+    told = grip_force, wrap_torque, dataclasses.astuple(gains), RECORDED_RAMP
+    arrays = cached(compute, list(demonstrations), bare, *told)
     return Reference(**{name: jnp.asarray(array) for name, array in arrays.items()})
 
 
@@ -132,6 +136,7 @@ def grip_table(
     targets: Float[Array, "d t u"],
     forces: Float[np.ndarray, "d"],
     gains: Gains,
+    wrap_torque: float = 0.0,
 ) -> Float[Array, "d t u"]:
     """The grip (m, rad) of each demonstration at a force (N); NaN leaves it as it is.
 
@@ -144,7 +149,7 @@ def grip_table(
         told = model_grips(demonstrations, bodies, np.asarray(targets, float), forces, gains)
         grip = jnp.asarray(told, jnp.float32)
     else:
-        grip = _grips_of_people(demonstrations, people, targets, forces, gains)
+        grip = _grips_of_people(demonstrations, people, targets, forces, gains, wrap_torque)
     whole = np.ones(frames)
     ramps = [closing_ramp(d, frames, RECORDED_RAMP) if d.grasp == RECORDED else whole for d in demonstrations]
     return grip * jnp.asarray(np.stack(ramps), jnp.float32)[..., None]
@@ -156,6 +161,7 @@ def _grips_of_people(
     targets: Float[Array, "d t u"],
     forces: Float[np.ndarray, "d"],
     gains: Gains,
+    wrap_torque: float,
 ) -> Float[Array, "d t u"]:
     frames = targets.shape[1]
     relative = [[padded(rows, frames) for rows in object_in_hand(d)] for d in demonstrations]
@@ -167,7 +173,7 @@ def _grips_of_people(
         if rows.size:
             seen = (targets[rows, :, NUM_WRIST:], rotation[rows], position[rows])
             chosen = [demonstrations[k].object for k in rows], [people[k] for k in rows]
-            grip = grip.at[rows, :, NUM_WRIST:].set(_grips(kind, *seen, *chosen, forces[rows], gains))
+            grip = grip.at[rows, :, NUM_WRIST:].set(_grips(kind, *seen, *chosen, forces[rows], gains, wrap_torque))
     return grip
 
 
@@ -221,13 +227,15 @@ def _grips(
     hands: Sequence[RigidHand],
     forces: Float[np.ndarray, "n"],
     gains: Gains,
+    wrap_torque: float,
 ) -> Float[Array, "n t j"]:
     """Grip offsets (rad) of demonstrations whose objects are of one kind; where each object is in the hand's frame."""
 
     @jax.jit
     @jax.vmap
     def offsets(a: Array, r: Array, p: Array, hand: RigidHand, size: Array, planes: Array, force: Array) -> Array:
-        return grip_offsets(a, (r, p), hand, kind, size, force, gains, planes if kind == "mesh" else None)
+        shape = planes if kind == "mesh" else None
+        return grip_offsets(a, (r, p), hand, kind, size, force, gains, shape, wrap_torque)
 
     sizes = jnp.asarray(np.stack([description.size for description in objects]), jnp.float32)
     planes = jnp.asarray(_stacked_planes([description.hulls for description in objects]), jnp.float32)

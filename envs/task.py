@@ -4,7 +4,7 @@ import dataclasses
 import math
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from envs.hand_contacts import check_contacts
 from envs.rewards import RewardWeights
@@ -27,6 +27,7 @@ class Task:
             exp(-alpha_p |p - p_ref|) and exp(-alpha_r angle).
         termination_distance: an episode ends when the object is this far from its reference.
         termination_distance_last: what that distance has shrunk to, linearly, at the end of training; null leaves it.
+        termination_angle: an episode also ends when the object is turned by this from its reference; null never.
         assist: stiffness (1/s^2) of a virtual controller that pulls the object along its reference at the beginning of
             training, critically damped, with forces in proportion to mass and inertia; 0 has none.
         assist_until: share of the training over which it fades to nothing, linearly.
@@ -34,6 +35,9 @@ class Task:
             own assisted replay (reference-state initialisation); the rest start at frame 0.
         grip_force: force (N) with which the reference presses fingers that touch; 0 leaves demonstrations as they are,
             null takes that of each demonstration's grasp type.
+        wrap_torque: share of its torque limit with which each flexing joint of a human hand closes where the
+            reference's grip is around an object, more than half of the fingers' phalanges touching; 0 presses there as
+            anywhere.
         lookahead: how many frames ahead the policy sees the reference.
         follow_object: whether the wrist's path goes to where the object is seen to stand, and back to the demonstrated
             one once it is held (`mjx_hand.player.approach`).
@@ -53,10 +57,12 @@ class Task:
     reward_rotation_alpha: float = 2.0
     termination_distance: float = 0.08
     termination_distance_last: float | None = None
+    termination_angle: float | None = 0.5
     assist: float = 0.0
     assist_until: float = 0.5
     random_start_prob: float = 0.7
     grip_force: float | None = None
+    wrap_torque: float = 0.5
     lookahead: tuple[int, ...] = (1, 4, 12)
     follow_object: bool = True
     contacts: str = "all"
@@ -72,11 +78,12 @@ class Task:
             "reward_position_alpha",
             "reward_rotation_alpha",
         )
-        for name in (*positive, "termination_distance", "termination_distance_last", "assist_until"):
+        ends = ("termination_distance", "termination_distance_last", "termination_angle")
+        for name in (*positive, *ends, "assist_until"):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0):
                 raise InputError(f"task.{name} is {value}; it must be a positive number")
-        for name, low, high in (("smoothing", 0.0, 1.0), ("random_start_prob", 0.0, 1.0)):
+        for name, low, high in (("smoothing", 0.0, 1.0), ("random_start_prob", 0.0, 1.0), ("wrap_torque", 0.0, 1.0)):
             if not low <= getattr(self, name) <= high:
                 raise InputError(f"task.{name} is {getattr(self, name)}; it must lie between {low:g} and {high:g}")
         if self.smoothing == 1.0:
@@ -97,6 +104,13 @@ class Task:
         """How far (m) from its reference the object may be at this share of the training."""
         last = self.termination_distance if self.termination_distance_last is None else self.termination_distance_last
         return self.termination_distance + (last - self.termination_distance) * progress
+
+    def lost(
+        self, position: Float[Array, ""], rotation: Float[Array, ""], progress: Float[Array, ""]
+    ) -> Bool[Array, ""]:
+        """Whether an object so far (m) and so turned (rad) from its reference ends the episode."""
+        far = position > self.lost_distance(progress)
+        return far if self.termination_angle is None else far | (rotation > self.termination_angle)
 
     def assist_stiffness(self, progress: Float[Array, ""]) -> Float[Array, ""]:
         """Stiffness (1/s^2) of the virtual object controller at this share of the training."""

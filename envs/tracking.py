@@ -81,7 +81,7 @@ class TrackingEnv(Env):
         self.task = Task() if task is None else task
         self.body = check_one_kind(hands)
         self.gains = gains = self.body.gains if gains is None else gains
-        reference = cached_reference(demonstrations, hands, self.task.grip_force, gains)
+        reference = cached_reference(demonstrations, hands, self.task.grip_force, self.task.wrap_torque, gains)
         self.assisted = self.task.assist > 0
         self.randomize = randomize
         motors, contacts = self.assisted or randomize is not None, self.task.contacts
@@ -203,7 +203,7 @@ class TrackingEnv(Env):
 
         position, rotation = self._errors(twin)
         terms = weighted_terms(task.rewards, self._tracked(twin, position, rotation, action, residual - before))
-        done = jnp.maximum((position > task.lost_distance(progress)).astype(jnp.float32), physics.unstable)
+        done = jnp.maximum(task.lost(position, rotation, progress).astype(jnp.float32), physics.unstable)
         finished = (frame >= self.reference.length[twin.demonstration] - 1).astype(jnp.float32)
         metrics = {**terms, "error/position": position, "error/rotation": rotation, "unstable": physics.unstable}
         info = {**state.info, "truncation": finished * (1 - done)}

@@ -22,7 +22,7 @@ from envs.demonstrations.recordings.variations import divided
 from envs.demonstrations.scripted.own_object import own_object
 from envs.demonstrations.scripted.simulated_capture import load_truth, project_recording, record_trials, save_truth
 from envs.demonstrations.scripted.trials import perform_trials
-from envs.demonstrations.set_settings import SetSettings, sealed_folder, sealed_seed, set_folder
+from envs.demonstrations.set_settings import SetSettings, sealed_folder, seed_of_sealed, set_folder
 from envs.grasps import grasp_type
 from envs.grip_force import RECORDED
 from mjx_hand.files.npz_archive import replacing
@@ -94,7 +94,7 @@ def make_sealed(settings: SetSettings, root: str | Path, report: Report = lambda
         if settings.side == "left":
             right = make_sealed(dataclasses.replace(settings, side="right"), root, report)
             return _mirror(right, temporary, [SEALED])
-        count, seed = (settings.sealed_people, settings.sealed_trials), sealed_seed(settings)
+        count, seed = (settings.sealed_people, settings.sealed_trials), seed_of_sealed(settings)
         return {SEALED: _make_part(settings, count, seed, temporary / SEALED, SEALED, report)}
 
     return _made(sealed_folder(settings, root), settings, fill)

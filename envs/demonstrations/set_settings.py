@@ -31,6 +31,8 @@ class SetSettings:
         heldout_people, heldout_trials: others, in the held-out part, and the demonstrations of each.
         sealed_people, sealed_trials: those of the sealed part, which is made and evaluated apart, after everything was
             chosen (`sealed_folder`).
+        sealed_seed: of the sealed part's draw. Once its figures were read and something was changed after them, they
+            are no longer unknown: the next are of the next seed.
         seed: of every draw; the held-out part uses the next one.
         capture: how they are recorded.
         recording: the real recording, and how it is varied; of the other settings it uses the seed.
@@ -48,6 +50,7 @@ class SetSettings:
     heldout_trials: int = 3
     sealed_people: int = 20
     sealed_trials: int = 3
+    sealed_seed: int = 1
     seed: int = 0
     capture: CaptureSettings = dataclasses.field(default_factory=CaptureSettings)
     recording: RecordingSettings = dataclasses.field(default_factory=RecordingSettings)
@@ -91,8 +94,9 @@ class SetSettings:
         for name in ("people", "trials", "heldout_people", "heldout_trials", "sealed_people", "sealed_trials"):
             if getattr(self, name) < 1:
                 raise InputError(f"data.{name} is {getattr(self, name)}; it must be at least 1")
-        if self.seed < 0:
-            raise InputError(f"data.seed is {self.seed}; it must not be negative")
+        for name in ("seed", "sealed_seed"):
+            if getattr(self, name) < 0:
+                raise InputError(f"data.{name} is {getattr(self, name)}; it must not be negative")
 
     def expand_types(self) -> tuple["SetSettings", ...]:
         """The settings of the single sets that are made: one, five of `all`, or none of a given folder."""
@@ -130,14 +134,14 @@ def sealed_folder(settings: SetSettings, root: str | Path) -> Path:
             "evaluate the part 'heldout'"
         )
     told = fingerprint(settings)
-    told |= {"people": settings.sealed_people, "trials": settings.sealed_trials}
+    told |= {"people": settings.sealed_people, "trials": settings.sealed_trials, "sealed_seed": settings.sealed_seed}
     del told["heldout_people"], told["heldout_trials"]
     return Path(root) / f"{settings.grasp}-sealed-{json_digest([_VERSION, told, _performed(settings.grasp)])[:10]}"
 
 
-def sealed_seed(settings: SetSettings) -> int:
-    """The seed of a type's sealed part, far from those of the other parts and of other types."""
-    return int(json_digest(["sealed", settings.seed, settings.grasp])[:8], 16)
+def seed_of_sealed(settings: SetSettings) -> int:
+    """What a type's sealed part is drawn with, far from what the other parts and other types are drawn with."""
+    return int(json_digest(["sealed", settings.sealed_seed, settings.seed, settings.grasp])[:8], 16)
 
 
 def _performed(grasp: str) -> dict[str, Any]:
@@ -150,7 +154,8 @@ def _performed(grasp: str) -> dict[str, Any]:
 def fingerprint(settings: SetSettings) -> dict[str, Any]:
     """All settings that tell sets apart, as in `CaptureSettings.fingerprint`."""
     told = dataclasses.asdict(settings) | {"capture": settings.capture.fingerprint()}
-    del told["sealed_people"], told["sealed_trials"]  # of a part that stands apart
+    for name in ("sealed_people", "sealed_trials", "sealed_seed"):  # of a part that stands apart
+        del told[name]
     del told["folder"]  # what it holds tells, not where it is: `load_set.part_digest`
     if settings.grasp != RECORDED:
         del told["recording"]

@@ -13,7 +13,7 @@ from mjx_hand.hand.joints import HINGES
 from mjx_hand.objects.description import OBJECT_KINDS
 from mjx_hand.objects.primitives import hull_planes
 from mjx_hand.rigid.gains import Gains
-from mjx_hand.rigid.rigid_hand import stack_hands
+from mjx_hand.rigid.rigid_hand import finger_tips, stack_hands
 
 THUMB = [k for k, name in enumerate(HINGES) if name.startswith("thumb")]
 
@@ -107,3 +107,19 @@ def test_a_weak_joint_is_not_asked_for_more_than_it_has(demonstrations, hands, i
     with_force = jax.jit(lambda force: grip_offsets(angles, where, hand, d.object.kind, size, force, weak))
     pressing = np.asarray(with_force(8.0)) - np.asarray(with_force(0.0))
     assert (np.abs(pressing) <= 0.01 / weak.stiffness + 1e-6).all()
+
+
+@pytest.mark.parametrize(("radius", "closes"), [(0.3, True), (0.004, False)], ids=["all touch", "few touch"])
+def test_a_hand_that_wraps_closes_with_every_flexing_joint(demonstrations, hands, radius, closes):
+    """Inside a ball of 0.3 m every phalanx touches; one of 4 mm at the middle finger's tip meets few."""
+    hand = jax.tree.map(lambda leaf: leaf[0], stack_hands(hands[:1]))
+    angles, gains = jnp.zeros((1, 20)), Gains()
+    tip = finger_tips(angles[0], hand)[1]
+    where = jnp.eye(3)[None], (jnp.zeros((1, 3)) if closes else tip[None])
+    size = jnp.full(3, radius)
+    told = (angles, where, hand, "sphere", size, 8.0, gains)
+    found, without = (np.asarray(grip_offsets(*told, wrap_torque=share))[0] for share in (0.5, 0.0))
+    flexing = np.array([name.endswith("flexion") for name in HINGES])
+    closing = np.where(flexing, 0.5 * gains.force_limit / gains.stiffness, 0.0)
+    np.testing.assert_allclose(found, closing if closes else without, atol=1e-4)
+    assert np.abs(without).max() > 1e-3

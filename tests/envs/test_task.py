@@ -36,6 +36,8 @@ def test_a_term_is_one_function_with_its_default_weight():
         ({"residual_scale_fingers": -0.1}, "task.residual_scale_fingers is -0.1"),
         ({"termination_distance": float("nan")}, "task.termination_distance is nan"),
         ({"termination_distance_last": 0.0}, "task.termination_distance_last is 0.0; it must be a positive number"),
+        ({"termination_angle": 0.0}, "task.termination_angle is 0.0; it must be a positive number"),
+        ({"wrap_torque": 1.5}, "task.wrap_torque is 1.5; it must lie between 0 and 1"),
         ({"assist": -1.0}, "task.assist is -1.0; it must lie between 0 and 600"),
         ({"assist": 1e4}, "more shakes the object"),
         ({"assist_until": 0.0}, "task.assist_until is 0.0; it must be a positive number"),
@@ -61,6 +63,15 @@ def test_termination_tightens_and_assistance_fades_with_the_training():
     task = Task(termination_distance=0.1, termination_distance_last=0.04, assist=300.0, assist_until=0.5)
     assert [float(task.lost_distance(jnp.float32(p))) for p in (0.0, 0.5, 1.0)] == pytest.approx([0.1, 0.07, 0.04])
     assert [float(task.assist_stiffness(jnp.float32(p))) for p in (0.0, 0.25, 0.5, 1.0)] == [300, 150, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("position", "rotation", "angle", "lost"),
+    [(0.05, 0.4, 0.5, False), (0.09, 0.0, 0.5, True), (0.0, 0.6, 0.5, True), (0.0, 3.0, None, False)],
+)
+def test_what_is_far_or_turned_is_lost(position, rotation, angle, lost):
+    task = Task(termination_distance=0.08, termination_angle=angle)
+    assert bool(task.lost(jnp.float32(position), jnp.float32(rotation), jnp.float32(0.0))) == lost
 
 
 def test_by_default_neither_changes():

@@ -10,7 +10,7 @@ from envs.demonstrations import dataset
 from envs.demonstrations.dataset import make_sealed, make_set
 from envs.demonstrations.load_set import PARTS, load_demonstrations, load_part
 from envs.demonstrations.scripted.simulated_capture import CaptureSettings, load_truth
-from envs.demonstrations.set_settings import SetSettings, sealed_folder, sealed_seed, set_folder
+from envs.demonstrations.set_settings import SetSettings, sealed_folder, seed_of_sealed, set_folder
 from envs.demonstrations.twin_hands import twins
 from envs.grasps import grasp_names
 from mjx_hand.errors import InputError
@@ -166,5 +166,8 @@ def test_the_sealed_part_is_of_other_people_and_stands_apart(set_path, tmp_path)
 
 
 def test_every_type_draws_its_sealed_part_by_itself():
-    seeds = [sealed_seed(SetSettings(grasp, seed=seed)) for grasp in grasp_names() for seed in (0, 1)]
-    assert len(set(seeds)) == len(seeds)
+    given = [{"seed": 0}, {"seed": 1}, {"sealed_seed": 0}, {"sealed_seed": 2}]
+    settings = [SetSettings(grasp, **one) for grasp in grasp_names() for one in given]
+    assert len({seed_of_sealed(one) for one in settings}) == len(settings)
+    assert len({sealed_folder(one, "") for one in settings}) == len(settings)
+    assert len({set_folder(one, "") for one in settings}) == 2 * len(grasp_names()), "other parts know nothing of it"
