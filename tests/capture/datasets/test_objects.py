@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from mjx_hand.capture.load_scene import load_scene
 from mjx_hand.errors import InputError
 from mjx_hand.motion import RecordedObject
-from tests.capture.datasets import test_arctic, test_dexycb, test_grab, test_hocap, test_oakink2
+from tests.capture.datasets import test_arctic, test_dexycb, test_grab, test_hocap, test_oakink2, test_taco
 from tests.capture.datasets.subjects import licensed_file
 
 FRAMES = 6
@@ -153,3 +153,18 @@ def test_objects_of_oakink2(tmp_path):
         if found is not scene.objects[2]:
             same_corners(found, expected)
     assert scene.objects[2].kind == "none"
+
+
+def test_objects_of_taco(tmp_path):
+    """Tool and target beside the hands' folders, in the hands' world; meshes in centimetres."""
+    folder = test_taco.write(tmp_path, objects={"target_017": matrices()[::-1], "tool_051": matrices()})
+    for name in ("051", "017"):
+        mesh(tmp_path / "Object_Models" / f"{name}_cm.obj", scale=100)
+    scene = load_scene(folder, mano=mano(tmp_path))
+    assert [hand.side for hand in scene.hands] == ["right", "left"]
+    assert (scene.fps, scene.source) == (30.0, "TACO (stir, spoon, bowl)/20231105_019")
+    np.testing.assert_array_equal(scene.up, [0, 0, 1])
+    assert [found.name for found in scene.objects] == ["tool_051", "target_017"]
+    expected = np.stack([turn.apply(BOX.vertices) for turn in TURN]) + PLACE[:, None]
+    same_corners(scene.object("tool_051"), expected)
+    same_corners(scene.object("target_017"), expected[::-1])
