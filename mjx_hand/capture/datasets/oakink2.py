@@ -25,8 +25,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
+from mjx_hand.capture.dataset_files.dataset_root import beside, one_name
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
-from mjx_hand.capture.datasets.dataset_root import beside, one_name
 from mjx_hand.capture.datasets.mano_motion import (
     LONGEST,
     chosen_side,
