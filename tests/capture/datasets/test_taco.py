@@ -29,7 +29,10 @@ def write(root, sides=("right", "left"), tensors: bool = True, shapes: bool = Tr
         told = changes.get(side, frames(side))
         shape = {"hand_shape": TAKES[side].shape[None]}
         if tensors:
-            told = {name: {key: Tensor(np.asarray(value, np.float32)) for key, value in one.items()} for name, one in told.items()}
+            told = {
+                name: {key: Tensor(np.asarray(value, np.float32)) for key, value in one.items()}
+                for name, one in told.items()
+            }
             shape = {"hand_shape": Tensor(shape["hand_shape"].astype(np.float32))}
         (folder / f"{side}_hand.pkl").write_bytes(dumps(told))
         if shapes:
