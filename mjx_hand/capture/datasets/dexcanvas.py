@@ -136,7 +136,7 @@ def _hand(name: str, path: Path, row: Contents, request: Request) -> Motion:
     hands = _hands(path, row, request)
     side = chosen_side(path, list(hands), request)
     fields = {name: _array(path, name, hands[side][name]) for name in (*_NEEDED, *_OTHERS) if name in hands[side]}
-    width = 45 if np.shape(fields.get("mano_hand_pose"))[-1:] == (45,) else 48
+    width = 45 if np.shape(fields.get("mano_hand_pose", ()))[-1:] == (45,) else 48
     layout = {"mano_global_pos": ("t", 3), "mano_global_rot_aa": ("t", 3), "mano_hand_pose": ("t", width)}
     values = numbers(path, fields, layout, finite=False)
     frames = len(values["mano_global_pos"])

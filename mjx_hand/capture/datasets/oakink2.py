@@ -66,7 +66,7 @@ def _frame(path: Path, number: int, hand: str, frame: dict[str, Any]) -> Float[n
     return np.concatenate([value.ravel().astype(float) for value in values.values()])
 
 
-def _frames(path: Path, contents: Contents) -> dict[int, dict[str, Any]]:
+def _frames(path: Path, contents: Contents) -> dict[Any, Any]:
     """What `raw_mano` holds, by frame."""
     frames = contents["raw_mano"]
     if not isinstance(frames, dict) or not all(isinstance(frame, dict) for frame in frames.values()):
@@ -74,7 +74,7 @@ def _frames(path: Path, contents: Contents) -> dict[int, dict[str, Any]]:
     return frames
 
 
-def _present(frames: dict[int, dict[str, Any]]) -> list[str]:
+def _present(frames: dict[Any, Any]) -> list[str]:
     return [side for side, hand in _KEYS.items() if any(f"{hand}__pose_coeffs" in f for f in frames.values())]
 
 
@@ -139,7 +139,7 @@ def _objects(path: Path, contents: Contents) -> tuple[RecordedObject, ...]:
 
 
 def _matrices(
-    path: Path, name: str, own: dict[int, Any], places: dict[int, int], length: int
+    path: Path, name: str, own: dict[Any, Any], places: dict[int, int], length: int
 ) -> Float[np.ndarray, "t 4 4"]:
     """An object's poses; NaN in the frames without one."""
     matrices = np.full((length, 4, 4), np.nan)
