@@ -121,7 +121,7 @@ OBJECT = "O02@0015@00001"
         ({"obj_transf": [1, 2]}, "obj_transf is not a dictionary of objects"),
         ({"obj_transf": {OBJECT: [np.eye(4)]}}, "obj_transf is not a dictionary of objects"),
         ({"obj_list": "O02"}, "obj_list is not a list of objects"),
-        ({"obj_list": ["../outside"]}, "obj_list is '../outside', expected the name"),
+        ({"obj_list": ["../outside"]}, "obj_list is '../outside', expected one name"),
         (
             {"obj_transf": {OBJECT: {100: np.eye(3)}}},
             r"frame 100: O02@0015@00001 has shape \(3, 3\), expected \(4, 4\)",
