@@ -22,7 +22,7 @@ PICKLES = (".pkl", ".pickle", ".p")
 WHOLE = ""  # the name of a value that is not a dictionary of named ones
 
 
-def read_contents(path: Path) -> Mapping[str, Any]:
+def read_contents(path: Path) -> Mapping[Any, Any]:
     """The named values in an `.npz`, or of the dictionary in an `.npy` or pickle; any other single value as `WHOLE`.
 
     Those of an `.npz` are read when they are looked up.

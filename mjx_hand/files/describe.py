@@ -9,6 +9,7 @@ import numpy as np
 from mjx_hand.errors import InputError
 from mjx_hand.files.contents import WHOLE, plain
 from mjx_hand.files.delimited import Table
+from mjx_hand.files.parquet_table import columns, count_rows, has_pyarrow, is_parquet
 from mjx_hand.files.safe_pickle import Record
 from mjx_hand.files.safe_tensor import is_tensor
 
@@ -36,6 +37,8 @@ def _described(path: Path, contents: Any) -> str:
         return f"a folder of {_listed(names)}" if names else "an empty folder"
     if isinstance(contents, Table):
         return f"a table of {len(contents.lines)} rows and the columns {_listed(contents.columns)}"
+    if is_parquet(path) and has_pyarrow():
+        return f"a table of {count_rows(path)} rows and the columns {_listed(columns(path))}"
     if isinstance(contents, Mapping) and list(contents) == [WHOLE]:
         return f"{_value(contents[WHOLE])} without names"
     if isinstance(contents, Mapping) and contents:

@@ -31,11 +31,14 @@ from mjx_hand.robots.robot_motion import RobotMotion, save_robot_motion
 from tests.capture.datasets import (
     test_arctic,
     test_dexcanvas,
+    test_dexcanvas_tables,
     test_dexycb,
     test_grab,
     test_hamer,
     test_hocap,
     test_oakink2,
+    test_objects,
+    test_taco,
 )
 from tests.capture.datasets.subjects import licensed_file, licensed_hand
 from tests.capture.marker_files.written import NAMES, WRITERS
@@ -224,10 +227,18 @@ def _datasets(folder: Path) -> list[Valid]:
     add("GRAB", root, test_grab.write(root))
     root = _new(folder, "oakink2")
     add("OakInk2 pickle", root, test_oakink2.write(root, hands=("rh",)))
+    test_objects.mesh(root / "object_raw" / "align_ds" / "O02@0015@00001" / "scan.ply")
     root = _new(folder, "oakink2 arrays")
     add("OakInk2 pickle", root, test_oakink2.write(root, hands=("rh",), tensors=False))
     root = _new(folder, "dexcanvas")
     add("DexCanvas pickle", root, test_dexcanvas.write_row(root, {"right": test_dexcanvas.fields()}))
+    for name, options in (("plain", {"compression": "none", "use_dictionary": False}), ("packed", {})):
+        root = _new(folder, f"dexcanvas {name}")
+        add("DexCanvas Parquet", root, test_dexcanvas_tables.write(root, test_dexcanvas_tables.row("right"), **options))
+    root = _new(folder, "taco")
+    opened = test_taco.write(root, sides=["right"], objects={"tool_051": test_objects.matrices()})
+    test_objects.mesh(root / "Object_Models" / "051_cm.obj", scale=100)
+    add("TACO folder", root, opened, *sorted(opened.iterdir()), *sorted(root.rglob("tool_051.npy")))
     for name, contents in (
         ("hamer", [test_hamer.output(k) for k in range(3)]),
         ("wilor", [[test_hamer.mini(k, "right")] for k in range(3)]),

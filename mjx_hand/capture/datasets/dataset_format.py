@@ -8,7 +8,7 @@ from typing import Any
 from mjx_hand.motion import Motion, RecordedScene
 from mjx_hand.plugins import plugins
 
-Contents = Mapping[str, Any]
+Contents = Mapping[Any, Any]  # names, in some pickles frame numbers
 
 
 @dataclasses.dataclass(frozen=True)

@@ -20,9 +20,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mjx_hand.capture.datasets.calibration import betas, read_settings, transform
+from mjx_hand.capture.dataset_files.calibration import betas, read_settings, transform
+from mjx_hand.capture.dataset_files.dataset_root import beside, one_name
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
-from mjx_hand.capture.datasets.dataset_root import beside, one_name
 from mjx_hand.capture.datasets.mano_motion import chosen_side, hands_of, mano_motion, recorded, some, turns
 from mjx_hand.capture.datasets.subject import full_pose, subject_of
 from mjx_hand.capture.object_poses.with_mesh import object_with_mesh

@@ -23,8 +23,8 @@ from typing import Any
 import numpy as np
 import trimesh
 
+from mjx_hand.capture.dataset_files.dataset_root import beside
 from mjx_hand.capture.datasets.dataset_format import Contents, DatasetFormat, Request
-from mjx_hand.capture.datasets.dataset_root import beside
 from mjx_hand.capture.datasets.mano_motion import chosen_side, hands_of, mano_motion, recorded, turns
 from mjx_hand.capture.datasets.subject import full_pose, subject_of
 from mjx_hand.capture.object_poses.with_mesh import object_with_mesh

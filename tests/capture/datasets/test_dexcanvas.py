@@ -44,7 +44,7 @@ def fields(side: str = "right", **changes) -> dict:
 def write_row(root, hands: dict, **more):
     row = {
         "hands": list(hands.values()),
-        "objects": [{"pos": [[0.0] * 3] * 6}],
+        "objects": [{"pos": [[0.0] * 3] * 6, "rot_aa": [[0.0] * 3] * 6}],
         "trajectory_metadata": {
             "total_frames": 6,
             "hand_names": [f"{side}_hand" for side in hands],

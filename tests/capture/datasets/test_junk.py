@@ -11,9 +11,18 @@ import pytest
 import yaml
 
 from mjx_hand.capture.load import load_motion
+from mjx_hand.capture.load_scene import load_scene
 from mjx_hand.errors import InputError
 from mjx_hand.motion import check_motion
-from tests.capture.datasets import test_arctic, test_dexcanvas, test_dexycb, test_hamer, test_hocap, test_oakink2
+from tests.capture.datasets import (
+    test_arctic,
+    test_dexcanvas,
+    test_dexycb,
+    test_hamer,
+    test_hocap,
+    test_oakink2,
+    test_taco,
+)
 from tests.capture.datasets.subjects import licensed_file
 
 JUNK = (
@@ -40,10 +49,12 @@ def spoiled(value: Any, way: tuple, junk: Any) -> Any:
     return value
 
 
-def reads_or_says(path, **choice) -> None:
+def reads_or_says(path, load=load_motion, **choice) -> None:
     said = ""
     try:
-        check_motion(load_motion(path, **choice))
+        found = load(path, **choice)
+        for hand in found.hands if load is load_scene else (found,):
+            check_motion(hand)
     except InputError as error:
         said = str(error)
     assert "\n" not in said
@@ -110,3 +121,40 @@ def test_junk_in_any_field_of_a_folders_settings(tmp_path, dataset):
                 file.write_text(json.dumps(spoiled(settings, way, junk)))
                 reads_or_says(folder, mano=mano)
         file.write_text(yaml.safe_dump(settings))
+
+
+OBJECTS = {
+    "oakink2.pkl": CONTENTS["oakink2.pkl"]
+    | {"obj_list": ["a", "b"], "obj_transf": {"a": {k: np.eye(4) for k in range(6)}, "b": {2: np.eye(4).tolist()}}},
+    "dexcanvas.pkl": CONTENTS["dexcanvas.pkl"]
+    | {
+        "objects": [{"pos": np.zeros((6, 3)), "rot_aa": np.zeros((6, 3)).tolist()}],
+        "trajectory_metadata": {"hand_slots": ["right", "left"], "object_names": ["cube1"], "hand_names": ["right"]},
+    },
+}
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_junk_in_what_is_said_of_objects(tmp_path, name):
+    contents = OBJECTS[name]
+    assert load_scene(write(tmp_path / name, contents)).objects
+    for way in paths({key: value for key, value in contents.items() if key not in ("raw_mano", "hands")}):
+        for junk in JUNK:
+            reads_or_says(write(tmp_path / name, spoiled(contents, way, junk)), load_scene)
+
+
+def test_junk_in_any_field_of_tacos_pickles(tmp_path):
+    folder = test_taco.write(tmp_path, sides=["right"], tensors=False)
+    hand, shape = folder / "right_hand.pkl", folder / "right_hand_shape.pkl"
+    for file, contents in ((hand, test_taco.frames("right")), (shape, {"hand_shape": np.zeros(10)})):
+        for junk in JUNK:
+            for spoilt in (
+                junk,
+                {1: junk},
+                {"00001": junk},
+                *(spoiled(contents, way, junk) for way in paths(contents)),
+            ):
+                file.write_bytes(pickle.dumps(spoilt))
+                reads_or_says(folder, load_scene)
+        file.write_bytes(pickle.dumps(contents))
+    assert load_scene(folder).hands

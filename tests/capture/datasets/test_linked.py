@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from mjx_hand.capture.datasets.dataset_root import beside
+from mjx_hand.capture.dataset_files.dataset_root import beside
 from mjx_hand.capture.load import load_motion
 from mjx_hand.errors import InputError
 from tests.capture.datasets import test_dexycb, test_grab, test_hocap

@@ -1,5 +1,6 @@
 """Objects of data sets: recordings in each layout, written by the data set's own formula for where vertices are."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from mjx_hand.capture.load_scene import load_scene
 from mjx_hand.errors import InputError
 from mjx_hand.motion import RecordedObject
-from tests.capture.datasets import test_arctic, test_dexycb, test_grab, test_hocap
+from tests.capture.datasets import test_arctic, test_dexycb, test_grab, test_hocap, test_oakink2, test_taco
 from tests.capture.datasets.subjects import licensed_file
 
 FRAMES = 6
@@ -26,6 +27,12 @@ def vertices(found: RecordedObject, corners: np.ndarray) -> np.ndarray:
 def mesh(path: Path, scale: float = 1.0) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     trimesh.Trimesh(scale * BOX.vertices, BOX.faces).export(path)
+
+
+def matrices() -> np.ndarray:
+    found = np.tile(np.eye(4), (FRAMES, 1, 1))
+    found[:, :3, :3], found[:, :3, 3] = TURN.as_matrix(), PLACE
+    return found
 
 
 def mano(folder: Path) -> Path:
@@ -121,3 +128,43 @@ def test_objects_of_hocap(tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match=r"has no MANO_RIGHT\.pkl"):
         load_scene(folder, mano=tmp_path / "empty")
+
+
+def test_objects_of_oakink2(tmp_path):
+    """Matrices by the frame's number, world from object; the repaired mesh before the scanned one."""
+    ids = (8, 12, 16, 28, 32, 36)  # every fourth of 120 a second, with a gap
+    poses = {f"O02@0015@0000{k}": dict(zip(ids, matrices(), strict=True)) for k in range(3)}
+    del poses["O02@0015@00001"][12]
+    path = test_oakink2.write(tmp_path, ids, obj_list=list(poses), obj_transf=poses)
+    mesh(tmp_path / "object_raw" / "align_ds" / "O02@0015@00000" / "scan.obj", scale=1.5)
+    mesh(tmp_path / "object_repair" / "align_ds" / "O02@0015@00000" / "model.ply")
+    mesh(tmp_path / "object_raw" / "align_ds" / "O02@0015@00001" / "scan.obj")
+    called = {f"O02@0015@0000{k}": {"obj_name": name} for k, name in enumerate(("bottle", "cap", "cap"))}
+    (tmp_path / "object_raw" / "obj_desc.json").write_text(json.dumps(called))
+    scene = load_scene(path, mano=mano(tmp_path))
+    assert [hand.side for hand in scene.hands] == ["right", "left"]
+    assert (scene.fps, scene.source, scene.num_frames) == (30.0, "OakInk2 scene_01__y00z++00000", 8)
+    np.testing.assert_array_equal(scene.up, [0, 1, 0])
+    assert [found.name for found in scene.objects] == ["bottle", "O02@0015@00001", "O02@0015@00002"]
+    expected = np.zeros((8, len(BOX.vertices), 3))
+    expected[[0, 1, 2, 5, 6, 7]] = np.stack([turn.apply(BOX.vertices) for turn in TURN]) + PLACE[:, None]
+    for found, seen in zip(scene.objects, ([0, 1, 2, 5, 6, 7], [0, 2, 5, 6, 7], [0, 1, 2, 5, 6, 7]), strict=True):
+        assert np.flatnonzero(found.seen).tolist() == seen
+        if found is not scene.objects[2]:
+            same_corners(found, expected)
+    assert scene.objects[2].kind == "none"
+
+
+def test_objects_of_taco(tmp_path):
+    """Tool and target beside the hands' folders, in the hands' world; meshes in centimetres."""
+    folder = test_taco.write(tmp_path, objects={"target_017": matrices()[::-1], "tool_051": matrices()})
+    for name in ("051", "017"):
+        mesh(tmp_path / "Object_Models" / f"{name}_cm.obj", scale=100)
+    scene = load_scene(folder, mano=mano(tmp_path))
+    assert [hand.side for hand in scene.hands] == ["right", "left"]
+    assert (scene.fps, scene.source) == (30.0, "TACO (stir, spoon, bowl)/20231105_019")
+    np.testing.assert_array_equal(scene.up, [0, 0, 1])
+    assert [found.name for found in scene.objects] == ["tool_051", "target_017"]
+    expected = np.stack([turn.apply(BOX.vertices) for turn in TURN]) + PLACE[:, None]
+    same_corners(scene.object("tool_051"), expected)
+    same_corners(scene.object("target_017"), expected[::-1])

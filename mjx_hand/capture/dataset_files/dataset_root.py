@@ -53,5 +53,5 @@ def one_name(path: Path, key: str, value: Any) -> str:
     name = str(value)
     sound = isinstance(value, str | int) and not isinstance(value, bool) and 0 < len(name) <= 200
     if not sound or name in (".", "..") or any(letter in "/\\" or not letter.isprintable() for letter in name):
-        raise InputError(f"{path}: {key} is {shown(value)}, expected the name of a calibration, without folders")
+        raise InputError(f"{path}: {key} is {shown(value)}, expected one name, without folders")
     return name
