@@ -10,6 +10,7 @@ from scipy.special import expit
 
 from envs.scene import NUM_WRIST, OBJECT, demonstration_spec
 from mjx_hand.bodies.body import Body
+from mjx_hand.bodies.closing import closing_directions
 from mjx_hand.bodies.coordinates import coordinates_per_target, hand_coordinates
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.rigid.gains import Gains
@@ -18,6 +19,7 @@ NEAR = 0.007  # m: a link nearer than this is taken to touch
 _SHARP = 0.001  # m, over which that fades
 _FAR = 0.02  # m, beyond which nobody asks how far
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
+_WRAPS, _SURE = 0.5, 0.3  # share of the other fingers' links with which a hand wraps; links, over which that fades
 _SIDES = 32  # of a cylinder's rim
 _APART = 1e-4  # m that a link is moved out to see which way the surface faces where it just touches
 
@@ -127,11 +129,13 @@ def model_grips(
     targets: Float[np.ndarray, "d t u"],
     forces: Float[np.ndarray, "d"],
     gains: Gains,
+    wrap_torque: float = 0.0,
 ) -> Float[np.ndarray, "d t u"]:
     """The grip (rad) of each demonstration at a force (N); NaN leaves it as it is.
 
     As `envs.grip.grip_offsets`: one damped step that closes the gaps of links that touch, and J^T f / kp, where the
-    opposing fingers press with the force and the others share as much.
+    opposing fingers press with the force and the others share as much. A hand that wraps, half of whose links of other
+    fingers touch, closes with `wrap_torque` of its joints' limits instead.
     """
     grips = np.zeros_like(targets)
     for k, (d, body) in enumerate(zip(demonstrations, bodies, strict=True)):
@@ -140,21 +144,24 @@ def model_grips(
         model = demonstration_spec(d, body).compile()
         touch, mix = Touch(model, body), coordinates_per_target(model, targets.shape[-1])[:, NUM_WRIST:]
         coordinates = hand_coordinates(model, targets[k])
+        closed = wrap_torque * closing_directions(body) * gains.force_limit / gains.stiffness
         opposing = np.isin(touch.fingers, body.opposing)
         for t in range(d.num_frames):
             touch.place(coordinates[t], d.object_pose[t])
-            grips[k, t, NUM_WRIST:] = _offsets(touch, mix, opposing, float(forces[k]), gains)
+            pressed, wraps = _offsets(touch, mix, opposing, float(forces[k]), gains)
+            wraps *= wrap_torque > 0
+            grips[k, t, NUM_WRIST:] = (1 - wraps) * pressed + wraps * closed
         grips[k, d.num_frames :] = grips[k, d.num_frames - 1]
     return grips
 
 
 def _offsets(
     touch: Touch, mix: Float[np.ndarray, "m j"], opposing: np.ndarray, force: float, gains: Gains
-) -> Float[np.ndarray, "j"]:
-    """Offsets (rad) of the actuated joints where hand and object are now."""
+) -> tuple[Float[np.ndarray, "j"], float]:
+    """Offsets (rad) of the actuated joints where hand and object are now, and how surely the hand wraps the object."""
     found = list(touch.nearest())
     if not found:
-        return np.zeros(mix.shape[1])
+        return np.zeros(mix.shape[1]), 0.0
     numbers = np.array([number for number, *_ in found])
     gaps = np.array([gap for _, gap, *_ in found])
     touching = expit((NEAR - gaps) / _SHARP)
@@ -172,4 +179,6 @@ def _offsets(
     closing = rows * touching[:, None]
     square = closing @ closing.T + _DAMPING**2 * np.eye(len(rows))
     step = closing.T @ np.linalg.solve(square, gaps * touching)
-    return step + np.clip(torque, -gains.force_limit, gains.force_limit) / gains.stiffness
+    around = touching[~opposing[numbers]].sum() - _WRAPS * (~opposing).sum()
+    pressed = step + np.clip(torque, -gains.force_limit, gains.force_limit) / gains.stiffness
+    return pressed, float(expit(around / _SURE))

@@ -9,11 +9,8 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 from scipy.spatial.transform import Rotation
 
-from envs.grasps import grasp_names, grasp_type
-from envs.grip import grip_offsets
-from envs.grip_force import RECORDED, closing_ramp, grip_force_of
-from envs.model_grip import model_grips
-from envs.scene import NUM_WRIST, base_rotation, wrist_coordinates
+from envs.grip_table import RECORDED_RAMP, grip_forces, grip_table, padded, people_of
+from envs.scene import base_rotation, wrist_coordinates
 from mjx_hand.bodies.body import Body
 from mjx_hand.bodies.body_places import body_model, model_places
 from mjx_hand.bodies.coordinates import hand_coordinates
@@ -21,14 +18,11 @@ from mjx_hand.bodies.human_body import body_of
 from mjx_hand.errors import InputError
 from mjx_hand.files.array_cache import cached, model_bytes
 from mjx_hand.motion.demonstration import Demonstration
-from mjx_hand.objects.description import OBJECT_KINDS, ObjectDescription
-from mjx_hand.objects.primitives import hull_planes
+from mjx_hand.objects.description import OBJECT_KINDS
 from mjx_hand.player.approach import approach_weights
 from mjx_hand.pytree import pytree
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand, finger_tips, stack_hands, without_meshes
-
-RECORDED_RAMP = 0.3  # s before a recorded object first moves, in which the grip sets in
 
 
 @pytree
@@ -73,7 +67,7 @@ def make_reference(
         hands: the twin's hand for each.
         grip_force: of all (N); 0 replays them as they are, None takes that of each one's grasp type, or what the weight
             of a recorded object asks for.
-        wrap_torque: share of the torque limits with which human hands that wrap close (`envs.grip.grip_offsets`).
+        wrap_torque: share of the torque limits with which hands that wrap close (`envs.grip.grip_offsets`).
         gains: of the hand's position controllers.
 
     Raises:
@@ -130,68 +124,13 @@ def cached_reference(
     return Reference(**{name: jnp.asarray(array) for name, array in arrays.items()})
 
 
-def grip_table(
-    demonstrations: Sequence[Demonstration],
-    hands: Sequence[RigidHand | Body],
-    targets: Float[Array, "d t u"],
-    forces: Float[np.ndarray, "d"],
-    gains: Gains,
-    wrap_torque: float = 0.0,
-) -> Float[Array, "d t u"]:
-    """The grip (m, rad) of each demonstration at a force (N); NaN leaves it as it is.
-
-    A recorded hand that reaches along an object would knock it over if it pressed on it: there the grip begins
-    shortly before the object moves. In demonstrations of grasp types open fingers stay off the object.
-    """
-    people, frames = _people(hands), targets.shape[1]
-    if people is None:
-        bodies = [body_of(hand) for hand in hands]
-        told = model_grips(demonstrations, bodies, np.asarray(targets, float), forces, gains)
-        grip = jnp.asarray(told, jnp.float32)
-    else:
-        grip = _grips_of_people(demonstrations, people, targets, forces, gains, wrap_torque)
-    whole = np.ones(frames)
-    ramps = [closing_ramp(d, frames, RECORDED_RAMP) if d.grasp == RECORDED else whole for d in demonstrations]
-    return grip * jnp.asarray(np.stack(ramps), jnp.float32)[..., None]
-
-
-def _grips_of_people(
-    demonstrations: Sequence[Demonstration],
-    people: Sequence[RigidHand],
-    targets: Float[Array, "d t u"],
-    forces: Float[np.ndarray, "d"],
-    gains: Gains,
-    wrap_torque: float,
-) -> Float[Array, "d t u"]:
-    frames = targets.shape[1]
-    relative = [[padded(rows, frames) for rows in object_in_hand(d)] for d in demonstrations]
-    rotation = jnp.asarray(np.stack([r for r, _ in relative]), jnp.float32)
-    position = jnp.asarray(np.stack([p for _, p in relative]), jnp.float32)
-    grip = jnp.zeros_like(targets)
-    for kind in OBJECT_KINDS:  # the shape is compiled in, so each kind's grips are worked out together
-        rows = np.array([k for k, d in enumerate(demonstrations) if d.object.kind == kind and forces[k] >= 0], int)
-        if rows.size:
-            seen = (targets[rows, :, NUM_WRIST:], rotation[rows], position[rows])
-            chosen = [demonstrations[k].object for k in rows], [people[k] for k in rows]
-            grip = grip.at[rows, :, NUM_WRIST:].set(_grips(kind, *seen, *chosen, forces[rows], gains, wrap_torque))
-    return grip
-
-
-def object_in_hand(demonstration: Demonstration) -> tuple[Float[np.ndarray, "t 3 3"], Float[np.ndarray, "t 3"]]:
-    """The object's rotation and position (m) in the wrist's frame."""
-    wrist = Rotation.from_quat(demonstration.motion.wrist_quaternion, scalar_first=True).inv()
-    object_rotation = Rotation.from_quat(demonstration.object_pose[:, 3:], scalar_first=True)
-    offset = demonstration.object_pose[:, :3] - demonstration.motion.wrist_position
-    return (wrist * object_rotation).as_matrix(), wrist.apply(offset)
-
-
 def _tips(
     demonstrations: Sequence[Demonstration],
     hands: Sequence[RigidHand | Body],
     targets: Float[Array, "d t u"],
 ) -> Float[np.ndarray, "d t tips 3"]:
     """Where demonstrations have their finger tips (m, world)."""
-    people, frames = _people(hands), targets.shape[1]
+    people, frames = people_of(hands), targets.shape[1]
     if people is None:
         bodies = [body_of(hand) for hand in hands]
         told = hand_coordinates(body_model(bodies[0]), np.asarray(targets, float))
@@ -218,54 +157,6 @@ def anticipated(targets: Float[Array, "d t u"], gains: Gains, fps: float) -> Flo
     return targets + jnp.asarray(kv / kp - 0.5 / fps, jnp.float32) * speed
 
 
-def _grips(
-    kind: str,
-    angles: Float[Array, "n t j"],
-    rotation: Float[Array, "n t 3 3"],
-    position: Float[Array, "n t 3"],
-    objects: Sequence[ObjectDescription],
-    hands: Sequence[RigidHand],
-    forces: Float[np.ndarray, "n"],
-    gains: Gains,
-    wrap_torque: float,
-) -> Float[Array, "n t j"]:
-    """Grip offsets (rad) of demonstrations whose objects are of one kind; where each object is in the hand's frame."""
-
-    @jax.jit
-    @jax.vmap
-    def offsets(a: Array, r: Array, p: Array, hand: RigidHand, size: Array, planes: Array, force: Array) -> Array:
-        shape = planes if kind == "mesh" else None
-        return grip_offsets(a, (r, p), hand, kind, size, force, gains, shape, wrap_torque)
-
-    sizes = jnp.asarray(np.stack([description.size for description in objects]), jnp.float32)
-    planes = jnp.asarray(_stacked_planes([description.hulls for description in objects]), jnp.float32)
-    return offsets(angles, rotation, position, stack_hands(hands), sizes, planes, jnp.asarray(forces, jnp.float32))
-
-
-def grip_forces(demonstrations: Sequence[Demonstration], grip_force: float | None) -> Float[np.ndarray, "d"]:
-    """The force (N) of each demonstration's grip."""
-    if grip_force is not None:
-        return np.full(len(demonstrations), grip_force)
-    unknown = sorted({d.grasp for d in demonstrations} - {*grasp_names(), RECORDED})
-    if unknown:
-        raise InputError(
-            f"demonstrations of {unknown[0]!r} are of no grasp type ({', '.join(grasp_names())}) that says how hard to "
-            "press; give task.grip_force, in newtons"
-        )
-    return np.array(
-        [
-            grip_force_of(d.object.mass, d.object.friction) if d.grasp == RECORDED else grasp_type(d.grasp).grip_force
-            for d in demonstrations
-        ]
-    )
-
-
-def _people(hands: Sequence[RigidHand | Body]) -> list[RigidHand] | None:
-    """The human hands that these are, whose kinematics JAX knows; None where one is another body."""
-    people = [body_of(hand).rigid for hand in hands]
-    return None if None in people else [person for person in people if person is not None]
-
-
 def _ingredient(hand: RigidHand | Body) -> object:
     """What a hand's part of the reference follows from."""
     rigid = body_of(hand).rigid
@@ -274,18 +165,6 @@ def _ingredient(hand: RigidHand | Body) -> object:
 
 def _one_of_kinds(demonstration: Demonstration) -> list[float]:
     return [float(demonstration.object.kind == kind) for kind in OBJECT_KINDS]
-
-
-def padded(rows: np.ndarray, frames: int) -> np.ndarray:
-    """The rows, the last of them held up to so many frames."""
-    return np.concatenate([rows, np.repeat(rows[-1:], frames - len(rows), axis=0)])
-
-
-def _stacked_planes(hulls: Sequence[Float[np.ndarray, "_ _ 3"]]) -> Float[np.ndarray, "d h f 4"]:
-    """The planes of each demonstration's mesh, padded to one shape by repeating faces and pieces."""
-    planes = [hull_planes(pieces) for pieces in hulls]
-    pieces, faces = (max(p.shape[k] for p in planes) for k in (0, 1))
-    return np.stack([np.pad(p, ((0, pieces - len(p)), (0, faces - p.shape[1]), (0, 0)), mode="edge") for p in planes])
 
 
 def _check(demonstrations: Sequence[Demonstration]) -> None:

@@ -17,7 +17,7 @@ from envs.evaluation.roll_out import make_roll_out, zero_residual
 from envs.grasps import grasp_names, grasp_type
 from envs.grasps.grasp_type import Pads, Wrap, wrap_torque
 from envs.grip_force import closing_ramp
-from envs.reference import grip_forces, grip_table
+from envs.grip_table import grip_forces, grip_table
 from envs.scene import NUM_WRIST
 from envs.tracking import TrackingEnv
 from envs.twin import Tables

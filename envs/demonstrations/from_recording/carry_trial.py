@@ -9,8 +9,9 @@ from mujoco import batch
 from scipy.spatial.transform import Rotation
 
 from envs.grip_force import grip_force_of
+from envs.grip_table import grip_table, padded
 from envs.physics.solver import gauss_seidel
-from envs.reference import anticipated, demonstrated_targets, grip_table, padded
+from envs.reference import anticipated, demonstrated_targets
 from envs.scene import NUM_WRIST, TIMESTEP, demonstration_models
 from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.motion.demonstration import Demonstration
