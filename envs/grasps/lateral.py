@@ -28,7 +28,6 @@ GRASP = GraspType(
     wrist_rotation=((-1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)),
     approach=(0.0, -0.006, 0.07),
     closing=Pads(opening=0.015, force=10.0),
-    grip_force=10.0,
     lift=(0.11, 0.15),
     carry=(0.06, 0.10),
     turn=(0.35, 0.52),

@@ -26,7 +26,6 @@ GRASP = GraspType(
     wrist_rotation=((-0.819, 0.574, 0.0), (0.0, 0.0, 1.0), (0.574, 0.819, 0.0)),
     approach=(0.0, 0.0, 0.07),
     closing=Pads(opening=0.015, force=12.0),
-    grip_force=8.0,
     lift=(0.10, 0.15),
     carry=(0.06, 0.10),
     turn=(0.35, 0.52),

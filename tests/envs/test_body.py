@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from envs.model_grip import model_grips
-from envs.reference import make_reference
+from envs.reference import demonstrated_targets, make_reference
 from envs.scene import NUM_WRIST, scene_spec
 from envs.tracking import TrackingEnv
 from envs.twin import twin_of
@@ -55,6 +55,20 @@ def test_a_reference_by_mujoco_is_that_of_the_capsules(demonstrations, hands, bo
     for k, frames in enumerate(lifted):
         one, other = np.asarray(by_jax.grip)[k, frames], np.asarray(by_mujoco.grip)[k, frames]
         assert np.abs(one - other).mean() < 0.25 * np.abs(one).mean()
+
+
+def test_a_body_that_wraps_closes_with_what_its_joints_can(demonstrations, bodies):
+    """The hand in the object: every link touches. Far from it none does, and nothing is asked for."""
+    d, gains = demonstrations[0], bodies[0].gains
+    around = dataclasses.replace(d.object, kind="sphere", size=np.full(3, 0.3))
+    inside = np.concatenate([d.motion.wrist_position, d.object_pose[:, 3:]], axis=1)
+    targets = np.asarray(demonstrated_targets(d), float)[None]
+    for pose, closes in ((inside, True), (inside + 5.0 * np.eye(7)[0], False)):
+        told = dataclasses.replace(d, object=around, object_pose=pose)
+        found = model_grips([told], bodies[:1], targets, np.array([8.0]), gains, wrap_torque=0.5)[0, :, NUM_WRIST:]
+        flexes = np.array([name.endswith("_flexion") for name in HINGES])
+        closed = 0.5 * flexes * gains.force_limit / gains.stiffness
+        np.testing.assert_allclose(found, np.broadcast_to(closed * closes, found.shape), atol=1e-6)
 
 
 def test_no_grip_where_none_is_asked_for(demonstrations, bodies):

@@ -45,6 +45,8 @@ _PLACES = ("demonstrations", "data.folder")  # taken from the run all the same w
 _POLICY = ("name", "data", "hand", "task", "ppo.policy_layers")  # what a policy cannot do without
 _RECORDING = ("data.recording",)  # of no account where the demonstrations are of no recording
 _FREE_OF_POLICY = ("engine",)  # any engine may play it
+# What runs were made with from before there were these options, where that is not the default that they came with.
+_BEFORE = {"task.wrap_torque": 0.0, "task.termination_angle": None}
 
 Settings = Mapping[str, Any]
 
@@ -61,8 +63,8 @@ def policy_settings(config: Config) -> Settings:
 
 
 def differing(before: Settings, now: Settings) -> list[str]:
-    """The options that differ. One that there was not yet when `before` was written had what is now its default."""
-    usual = {option: value for option, value in settings_of(Config()).items() if option in now}
+    """The options that differ. One that there was not yet when `before` was written had `_BEFORE`, or its default."""
+    usual = {option: value for option, value in (settings_of(Config()) | _BEFORE).items() if option in now}
     was = _renamed(before)
     if not any(_is(option, _RECORDING) for option in now):
         was = {option: value for option, value in was.items() if not _is(option, _RECORDING)}
@@ -75,7 +77,7 @@ def contradiction(what: str, before: Settings, now: Settings) -> str:
     options = differing(before, now)
     if not options:
         return ""
-    usual, others = settings_of(Config()), f" and {len(options) - 1} more" if len(options) > 1 else ""
+    usual, others = settings_of(Config()) | _BEFORE, f" and {len(options) - 1} more" if len(options) > 1 else ""
     was = _renamed(before).get(options[0], usual.get(options[0]))
     return f"{what} holds a training with {options[0]}={was}, now {now.get(options[0])}{others}"
 
@@ -120,7 +122,7 @@ def with_settings_of(config: Config, run: Settings, given: Collection[str], what
         raise InputError(f"{refused}; leave out that option, or give the folder of another training with out=FOLDER")
     kept = {
         option: value
-        for option, value in run.items()
+        for option, value in (_BEFORE | dict(run)).items()
         if option in now and not _is_given(option, given) and (_is(option, _PLACES) or not _is(option, _FREE))
     }
     try:

@@ -2,8 +2,8 @@
 
 A tracked hand shows where fingers are, not how hard they press. As in the references of training (`envs.grip`), the
 thumb presses with a force, the fingers that touch share as much between them, and each spreads its share over its
-phalanges; a hand whose thumb does not touch presses against the palm. Here contacts and derivatives are the C engine's,
-at the very state.
+phalanges; a hand whose thumb does not touch presses against the palm; one that wraps the object closes with a share of
+what its flexing joints can. Here contacts and derivatives are the C engine's, at the very state.
 """
 
 import mujoco
@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from envs.grip_force import grip_force_of
 from envs.scene import NUM_WRIST
-from mjx_hand.hand.joints import FINGERS, LINKS, NUM_HINGES
+from mjx_hand.hand.joints import FINGERS, HINGES, LINKS, NUM_HINGES
 from mjx_hand.rigid.gains import Gains
 
 NEAR = 0.008  # m: a phalanx that is closer to the object is taken to touch
@@ -20,6 +20,9 @@ _SAFETY = 4.0  # times the force that just holds the object's weight by friction
 _LEAST = 2.0  # N
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
 _SOON = 0.15  # s over which a grip is taken up and let go: a finger that comes near does not snap shut
+_WRAP_TORQUE = 0.5  # of their torque limits, with which flexing joints close around an object
+_WRAPS, _LETS_GO = 7, 2  # phalanges of other fingers than the thumb that are near when a hand begins and ends to wrap
+_FLEXES = np.array([name.endswith("_flexion") for name in HINGES])
 _THUMB = FINGERS.index("thumb")
 _HINGES = slice(NUM_WRIST, NUM_WRIST + NUM_HINGES)
 
@@ -51,6 +54,7 @@ class Grip:
         self._force = max(_LEAST, grip_force_of(mass, friction, _SAFETY / 2))
         self._jacobian = np.zeros((3, model.nv))
         self._offsets = np.zeros(NUM_HINGES)
+        self._wraps = False
 
     def offsets(self, data: mujoco.MjData, seconds: float) -> Float[np.ndarray, "20"]:
         """What to add to the hinges' targets (rad).
@@ -78,6 +82,11 @@ class Grip:
         if rows:  # and a damped least-squares step that closes the gaps
             lever = np.stack(rows)
             wanted += lever.T @ np.linalg.solve(lever @ lever.T + _DAMPING**2 * np.eye(len(rows)), np.array(gaps))
+        around = sum(link > 0 and (link - 1) // 3 != _THUMB for link in nearest)
+        # What slips touches less: a grip that weakened with it would let go.
+        self._wraps = around > _LETS_GO if self._wraps else around >= _WRAPS
+        if self._wraps:
+            wanted = _WRAP_TORQUE * _FLEXES * limit / self._gains.stiffness
         self._offsets += min(1.0, seconds / _SOON) * (wanted - self._offsets)
         return self._offsets
 
