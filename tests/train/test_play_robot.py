@@ -74,7 +74,7 @@ def seen_by_mujoco(env: TrackingEnv, qpos: np.ndarray) -> np.ndarray:
 
 def same_places(one: np.ndarray, other: np.ndarray) -> bool:
     away = [KDTree(a).query(b)[0].max() for a, b in ((one, other), (other, one))]
-    return max(away) < 1e-6
+    return max(away) < 1e-5
 
 
 def test_the_robot_is_where_the_rollout_has_it(playing: Viewer, own: Own):
@@ -95,7 +95,7 @@ def test_the_robot_is_where_the_rollout_has_it(playing: Viewer, own: Own):
 
 def test_beside_it_is_the_persons_hand_as_recorded(playing: Viewer, own: Own):
     """Not where the robot is told to be, which is another layer, hidden at first."""
-    recorded, (env, rollouts, _) = load_demonstration(demonstration_path("pinch")), own
+    recorded, (env, *_) = load_demonstration(demonstration_path("pinch")), own
     shown = meshes(playing.scene.layers, "demonstration")
     wanted = twin_layer(recorded.motion, twins([recorded])[0])
     np.testing.assert_allclose(shown.transforms, wanted.transforms, atol=1e-6)
@@ -106,9 +106,7 @@ def test_beside_it_is_the_persons_hand_as_recorded(playing: Viewer, own: Own):
     assert not told.shown
     model, frame = env.models[0], 100
     hand = hand_coordinates(model, demonstrated_targets(env.demonstrations[0])[frame])
-    place = seen_by_mujoco(env, np.concatenate([hand, recorded.object_pose[frame]]))
-    away = KDTree(place).query(in_world(told, frame))[0].max()
-    assert away < 1e-5
+    assert same_places(in_world(told, frame), seen_by_mujoco(env, np.concatenate([hand, recorded.object_pose[frame]])))
     np.testing.assert_allclose(
         meshes(playing.scene.layers, "demonstrated object").transforms[:, 0, :3, 3],
         recorded.object_pose[:, :3],
@@ -132,8 +130,8 @@ def test_a_robots_simulation_that_diverged_is_shown(own: Own):
     start = env.tables.starts
     targets = np.asarray(env.reference.controls)[0, 40].astype(float)
     targets[8] = np.nan
-    row = [np.asarray(a[0, 40], float) for a in (start.qpos, start.qvel)]
-    unstable = Unstable(1, 64, 2, 0, 40, *row, targets)
+    qpos, qvel = (np.asarray(a[0, 40], float) for a in (start.qpos, start.qvel))
+    unstable = Unstable(1, 64, 2, 0, 40, qpos, qvel, targets)
     scene = unstable_scene(unstable, env, "pinch")
     path = step_again(env.engine.models[0], unstable, env.engine.substeps)
     assert scene.num_frames == len(path)

@@ -2,7 +2,6 @@
 
 import mujoco
 import numpy as np
-import trimesh
 from jaxtyping import Float
 
 from mjx_hand.objects.description import ObjectDescription
@@ -50,16 +49,21 @@ def model_layer(
 def _surfaces(model: mujoco.MjModel) -> dict[int, Mesh]:
     """What is seen of each of the hand's bodies, in the body's frame."""
     hand = model.body_rootid == model.body("wrist").id
-    pieces: dict[int, list[trimesh.Trimesh]] = {}
+    pieces: dict[int, list[Mesh]] = {}
     for geom in np.flatnonzero(model.geom_group == VISUAL_GROUP):
         body = int(model.geom_bodyid[geom])
         if hand[body]:
             pieces.setdefault(body, []).append(_surface(model, int(geom)))
-    whole = {body: trimesh.util.concatenate(own) for body, own in sorted(pieces.items())}
-    return {body: (np.asarray(mesh.vertices), np.asarray(mesh.faces)) for body, mesh in whole.items()}
+    return {body: _joined(own) for body, own in sorted(pieces.items())}
 
 
-def _surface(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh:
+def _joined(pieces: list[Mesh]) -> Mesh:
+    first = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])[:-1]
+    faces = [faces + start for (_, faces), start in zip(pieces, first, strict=True)]
+    return np.concatenate([vertices for vertices, _ in pieces]), np.concatenate(faces)
+
+
+def _surface(model: mujoco.MjModel, geom: int) -> Mesh:
     """A geom in its body's frame."""
     if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
         mesh = model.geom_dataid[geom]
@@ -67,9 +71,8 @@ def _surface(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh:
         vertices = model.mesh_vert[first : first + model.mesh_vertnum[mesh]].astype(float)
         faces = model.mesh_face[face : face + model.mesh_facenum[mesh]]
     else:
-        kind = _KINDS[mujoco.mjtGeom(model.geom_type[geom])]
-        size = model.geom_size[geom]
+        kind, size = _KINDS[mujoco.mjtGeom(model.geom_type[geom])], model.geom_size[geom]
         vertices, faces = object_mesh(ObjectDescription(size=size, mass=1.0, friction=1.0, kind=kind))
     turn = np.zeros(9)
     mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
-    return trimesh.Trimesh(vertices @ turn.reshape(3, 3).T + model.geom_pos[geom], faces, process=False)
+    return vertices @ turn.reshape(3, 3).T + model.geom_pos[geom], faces

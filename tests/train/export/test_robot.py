@@ -167,7 +167,10 @@ def test_a_hand_with_ties_is_played_too(little: Config, tmp_path: Path):
     untouched, held = int((moved > 1e-3).argmax()), int((played.position_error > 0.01).argmax())
     assert untouched > 20
     np.testing.assert_allclose(played.qpos[:untouched], wanted[:untouched], atol=1e-4)
-    assert np.linalg.norm(played.object_pose[:held, :3] - wanted[:held, -7:-4], axis=1).max() < 1e-3
+    (example,) = (ROOT / "examples").glob("09_*.py")
+    run(EXAMPLE, folder, tmp_path / "example.npz", example)
+    for path in (played.object_pose, np.load(tmp_path / "example.npz")["path"]):
+        assert np.linalg.norm(path[:held, :3] - wanted[:held, -7:-4], axis=1).max() < 1e-3
     coupled = load_exported_policy(folder / "policy.npz").contract["body"]["coupled"]
     assert next((tie["joint"], tie["leader"], tie["slope"]) for tie in coupled) == ("thumb_three", "thumb_two", SLOPE)
     assert f"- thumb_three: {SLOPE:g} * thumb_two + 0" in (folder / "contract.md").read_text()
