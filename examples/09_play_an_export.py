@@ -13,9 +13,6 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-HAND = 26  # the wrist's slides and turns, and 20 hinges
-FINGERS = ("index", "middle", "pinky", "ring", "thumb")
-
 
 def act(policy: dict, features: np.ndarray) -> np.ndarray:
     """The next filtered residual (m, rad) for features in physical units."""
@@ -25,7 +22,7 @@ def act(policy: dict, features: np.ndarray) -> np.ndarray:
         x = x @ policy[f"kernel{k}"] + policy[f"bias{k}"]
         x = x / (1 + np.exp(-x))
     action = np.clip(x @ policy[f"kernel{last}"] + policy[f"bias{last}"], -1, 1)
-    before = features[policy["residual_start"] :][:HAND]
+    before = features[policy["residual_start"] :][: len(action)]
     return policy["smoothing"] * before + (1 - policy["smoothing"]) * policy["residual_scale"] * action
 
 
@@ -36,23 +33,25 @@ def turn(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return vector
 
 
-def see(model, data, reference: dict, lookahead: np.ndarray, frame: int, residual: np.ndarray) -> np.ndarray:
+def see(model, data, reference: dict, contract: dict, frame: int, residual: np.ndarray) -> np.ndarray:
     """The policy's features, in the contract's order."""
     mujoco.mj_kinematics(model, data)  # places follow the state; mj_step leaves them a step behind
+    moved, lookahead = model.actuator_trnid[:, 0], np.array(contract["lookahead"])  # actuated joints: the hand's
+    qpos, qvel = data.qpos[model.jnt_qposadr[moved]], data.qvel[model.jnt_dofadr[moved]]
     targets, poses, base = reference["targets"], reference["object_pose"], reference["base"]
     wrist, thing = data.body("wrist"), data.body("object")
-    tips = np.array([data.site(f"{finger}_tip").xpos for finger in FINGERS])
-    place, pose = data.qpos[HAND : HAND + 3], poses[frame]
+    tips = np.array([data.site(f"{finger}_tip").xpos for finger in contract["body"]["fingers"]])
+    place, pose = data.qpos[-7:-4], poses[frame]  # the object's coordinates are the last
     later = np.minimum(frame + lookahead, len(targets) - 1)
     parts = (
-        data.qpos[:HAND] - targets[frame],
-        data.qvel[:HAND],
+        qpos - targets[frame],
+        qvel,
         residual,
         reference["grip"][frame, 6:],
         base.T @ (place - pose[:3]),
-        turn(data.qpos[HAND + 3 :], pose[3:]),
-        base.T @ data.qvel[HAND : HAND + 3],
-        data.qvel[HAND + 3 :],
+        turn(data.qpos[-4:], pose[3:]),
+        base.T @ data.qvel[-6:-3],
+        data.qvel[-3:],
         wrist.xmat.reshape(3, 3).T @ (place - wrist.xpos),
         (tips - place) @ thing.xmat.reshape(3, 3),
         targets[later] - targets[frame],
@@ -68,13 +67,13 @@ def play(policy: dict, reference: dict, scene: Path) -> np.ndarray:
     model = mujoco.MjModel.from_xml_path(str(scene))
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = reference["start_qpos"], reference["start_qvel"]
-    lookahead = np.array(json.loads(str(policy["contract"]))["lookahead"])
-    residual, path = np.zeros(HAND), [data.qpos[HAND:].copy()]
+    contract = json.loads(str(policy["contract"]))
+    residual, path = np.zeros(model.nu), [data.qpos[-7:].copy()]
     for frame in range(len(reference["targets"]) - 1):
-        residual = act(policy, see(model, data, reference, lookahead, frame, residual))
+        residual = act(policy, see(model, data, reference, contract, frame, residual))
         data.ctrl[:] = np.clip(reference["controls"][frame + 1] + residual, reference["low"], reference["high"])
         mujoco.mj_step(model, data, nstep=int(reference["substeps"]))
-        path.append(data.qpos[HAND:].copy())
+        path.append(data.qpos[-7:].copy())
     return np.array(path)
 
 

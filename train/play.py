@@ -1,13 +1,18 @@
 """Play a policy in the browser, in real time: `mjx-hand play config=pinch`.
 
-Shows a held-out demonstration, its twin under the policy, the object, and the error. `play.demonstration=3` chooses
-one; without it, the one of median tracking error. What has not been trained here is played by the bundled policy,
-on the demonstration bundled with it, where there is one. `play.unstable=FILE` shows a simulation that
-diverged in training instead: the state before the step, and each physics step of it that the engine could make.
+Shows a held-out demonstration as a person did it, the twin under the policy, a person's hand or a robot's
+(`hand=allegro`), the object, and the error. `play.demonstration=3` chooses one; without it, the one of median tracking
+error. What has not been trained here is played by the bundled policy, on the demonstration bundled with it, where there
+is one. `play.unstable=FILE` shows a simulation that diverged in training instead: the state before the step, and each
+physics step of it that the engine could make.
 """
 
-from mjx_hand.bodies.human_body import person
+from envs.demonstrations.load_env import people_of_set
+from envs.tracking import TrackingEnv
+from mjx_hand.bodies.human_body import HUMAN, body_of
 from mjx_hand.errors import InputError
+from mjx_hand.motion import Demonstration
+from mjx_hand.rigid.rigid_hand import RigidHand
 from mjx_hand.view.browser.viewer import Viewer
 from train.experiment.bundled_policies import bundled_env, with_policy
 from train.experiment.evaluate_seeds import median_and_worst
@@ -45,9 +50,8 @@ def rollout_viewer(config: Config) -> Viewer:
     Raises:
         InputError: no such demonstration, or what `chosen_checkpoint` and `Viewer` refuse.
     """
-    if config.checkpoint:  # before anything is made for it
-        load_checkpoint(chosen_path(config))
     config, included = with_policy(config)
+    load_checkpoint(chosen_path(config))  # before anything is made for it
     beside = included and config.play.demonstration is None
     env = bundled_env(config) if beside else load_env(config, "heldout")
     _, rollouts, scores = rolled_out(config, env)
@@ -58,9 +62,18 @@ def rollout_viewer(config: Config) -> Viewer:
     if index >= len(errors):
         raise InputError(f"play.demonstration is {index}; there are {len(errors)}, numbered from 0")
     outcome = scores.failure[index] or "followed to the end"
-    title = f"{config.name} {index}: {outcome}, {errors[index]:.2f} cm"
-    scene = rollout_scene(env.demonstrations[index], rollouts, index, person(env.hands[index]), title)
-    return Viewer(scene, config.play.port)
+    robot = "" if env.body.name == HUMAN else f" on {env.body.name}"
+    title = f"{config.name} {index}{robot}: {outcome}, {errors[index]:.2f} cm"
+    recorded, person = _person(config, env, index)
+    return Viewer(rollout_scene(env, rollouts, index, recorded, person, title), config.play.port)
+
+
+def _person(config: Config, env: TrackingEnv, index: int) -> tuple[Demonstration, RigidHand]:
+    """What the person did that demonstration `index` is of, and the hand that did."""
+    rigid = body_of(env.hands[index]).rigid
+    if rigid is not None:
+        return env.demonstrations[index], rigid
+    return people_of_set(config.data, "heldout", config.demonstrations, config.hand)[index]
 
 
 def main(config: Config) -> None:

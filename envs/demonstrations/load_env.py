@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from envs.demonstrations.load_set import load_demonstrations
-from envs.demonstrations.on_robot.robot_set import robot_demonstrations
+from envs.demonstrations.on_robot.robot_set import robot_demonstrations, robot_set
 from envs.demonstrations.set_settings import GIVEN, SetSettings
 from envs.demonstrations.twin_hands import twins
 from envs.disturbances.randomize import Randomize
@@ -12,6 +12,8 @@ from envs.tracking import TrackingEnv
 from mjx_hand.bodies.human_body import HUMAN
 from mjx_hand.bodies.robot_body import robot_body
 from mjx_hand.errors import InputError
+from mjx_hand.motion.demonstration import Demonstration
+from mjx_hand.rigid.rigid_hand import RigidHand
 
 
 def load(
@@ -71,3 +73,17 @@ def env_of_set(
     body = robot_body(hand)
     brought = robot_demonstrations(demonstrations, people, body)
     return TrackingEnv(brought, [body] * len(brought), engine, task, randomize=randomize)
+
+
+def people_of_set(
+    settings: SetSettings, part: str, root: str | Path, hand: str
+) -> list[tuple[Demonstration, RigidHand]]:
+    """What people did, and their hands, in the demonstrations that `env_of_set` is over for a robot hand, in its order.
+
+    Raises:
+        InputError: as `load`.
+    """
+    demonstrations = load_demonstrations(settings, part, root)
+    people = twins(demonstrations)
+    done = robot_set(demonstrations, people, robot_body(hand)).done
+    return [(demonstrations[k], people[k]) for k in done]

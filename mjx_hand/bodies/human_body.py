@@ -41,18 +41,6 @@ def body_of(hand: RigidHand | Body) -> Body:
     return hand if isinstance(hand, Body) else human_body(hand)
 
 
-def person(hand: RigidHand | Body) -> RigidHand:
-    """The human hand that this is.
-
-    Raises:
-        InputError: a robot's.
-    """
-    rigid = body_of(hand).rigid
-    if rigid is None:
-        raise InputError(f"the hand is {body_of(hand).name!r}, but this is for a human hand only; give hand=human")
-    return rigid
-
-
 def check_one_kind(hands: Sequence[RigidHand | Body]) -> Body:
     """The first of these hands, if all are of one kind and commanded alike.
 

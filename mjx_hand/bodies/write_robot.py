@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from mjx_hand.bodies.body import Body
-from mjx_hand.rigid.export.mesh_folder import MESHES, filling, write_obj
+from mjx_hand.rigid.export.mesh_folder import filling, write_surfaces
 from mjx_hand.robots.model.shapes import off_the_mesh
 from mjx_hand.robots.model.spec import RobotModel
 
@@ -45,15 +45,7 @@ def write_robot(body: Body, folder: str | Path, *, self_collision: bool = False)
         if geom.name in touching and self_collision:
             geom.conaffinity = 1
     with filling(folder) as temporary:
-        (temporary / MESHES).mkdir()
-        spec.meshdir = MESHES
-        spec.modelfiledir = str(temporary)
-        for mesh in spec.meshes:
-            file = f"{mesh.name.replace('/', '_')}.obj"
-            vertices, faces = np.array(mesh.uservert).reshape(-1, 3), np.array(mesh.userface).reshape(-1, 3)
-            write_obj(temporary / MESHES / file, vertices, faces)
-            mesh.file = file
-            mesh.uservert, mesh.userface = [], []
+        write_surfaces(spec, temporary)
         spec.compile()
         (temporary / f"{body.name}.xml").write_text(spec.to_xml())
     return Path(folder) / f"{body.name}.xml"

@@ -12,7 +12,7 @@ from envs.scene import NUM_WRIST, scene_spec
 from envs.tracking import TrackingEnv
 from envs.twin import twin_of
 from mjx_hand.bodies.body_places import model_places
-from mjx_hand.bodies.human_body import body_of, check_one_kind, human_body, person
+from mjx_hand.bodies.human_body import body_of, check_one_kind, human_body
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import FINGERS, HINGES, LINKS
 from mjx_hand.rigid.rigid_hand import forward_kinematics, tip_positions
@@ -33,7 +33,7 @@ def test_the_human_body_is_the_rigid_hand(hands):
     for contact in body.contacts:
         assert model.body(model.geom(contact.name).bodyid[0]).name == contact.link
         assert contact.link.startswith(contact.finger or "wrist")
-    assert body_of(hands[0]).rigid is person(body) is hands[0]
+    assert body_of(hands[0]).rigid is body.rigid is hands[0]
 
 
 def test_mujocos_kinematics_are_the_rigid_hands(hands, bodies):
@@ -93,8 +93,6 @@ def test_hands_of_two_kinds_are_refused(hands, bodies):
     other = dataclasses.replace(bodies[0], name="other")
     with pytest.raises(InputError, match=r"hand 1 is 'other' with 20 actuated joints, hand 0 'human' with 20"):
         check_one_kind([hands[0], other])
-    with pytest.raises(InputError, match=r"the hand is 'other', but this is for a human hand only; give hand=human"):
-        person(other)
 
 
 def test_a_scene_takes_a_body_or_a_rigid_hand(demonstrations, hands):

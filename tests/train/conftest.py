@@ -15,6 +15,8 @@ from envs.disturbances import Randomize
 from envs.evaluation.roll_out import make_roll_out
 from envs.parallel import ParallelEnv
 from envs.tracking import TrackingEnv
+from tests.robots.urdfs import urdf_of
+from tests.train.robot_run import robot_run
 from train.experiment.setup import load_env
 from train.learning.curve import Point
 from train.learning.learner import Learner
@@ -85,3 +87,10 @@ def env(tiny: Config) -> TrackingEnv:
 def trained(tiny: Config, env: TrackingEnv) -> tuple[Path, list[Point]]:
     """The folder of a finished training, and what it returned."""
     return Path(tiny.out), train.ppo.train(tiny, env)
+
+
+@pytest.fixture(scope="session")
+def allegro(tmp_path_factory: pytest.TempPathFactory) -> Config:
+    """A run of an Allegro hand, whose policy holds the pinch that comes with the project."""
+    assert urdf_of("allegro").is_file()  # skips without the package that carries it
+    return robot_run(tmp_path_factory.mktemp("allegro"), "allegro")

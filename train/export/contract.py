@@ -1,33 +1,35 @@
 """The contract of an exported policy: every input and output, the body, the demonstrations, versions, digest."""
 
+import dataclasses
 import importlib.metadata
 import platform
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from envs.observation import observed_features
 from envs.scene import TIMESTEP
 from envs.task import Task
-from mjx_hand.hand.joints import WRIST_SLIDES
+from mjx_hand.bodies.body import NUM_WRIST, Body
+from mjx_hand.bodies.body_places import body_model
 from mjx_hand.objects.description import OBJECT_KINDS
 from mjx_hand.player.exported_policy import ExportedPolicy
-from mjx_hand.player.features import OBSERVATION_LIMIT, TARGETS, Feature
+from mjx_hand.player.features import OBSERVATION_LIMIT, Feature
 from mjx_hand.player.tracking_reference import FIELDS
 from mjx_hand.player.tracking_reference import SCHEMA as REFERENCE_SCHEMA
-from mjx_hand.rigid.gains import Gains
 from train.learning.checkpoint import Checkpoint
 
 SCHEMA = "mjx-hand/contract/1"
 _PACKAGES = ("mjx-hand", "jax", "brax", "flax", "mujoco", "numpy")
-_UNITS = ["m"] * len(WRIST_SLIDES) + ["rad"] * (len(TARGETS) - len(WRIST_SLIDES))
 
 
 def make_contract(
     policy: ExportedPolicy,
     checkpoint: Checkpoint,
     task: Task,
+    body: Body,
     difference: float,
     demonstrations: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
@@ -37,10 +39,11 @@ def make_contract(
         policy: as exported.
         checkpoint: that it was made from.
         task: that it was trained on.
+        body: that it moves.
         difference: largest, of an action from Brax's inference.
         demonstrations: what each that is written beside it is.
     """
-    table = observed_features(task)
+    table, targets, units = observed_features(task, body.names, body.reach), list(body.names.targets), _units(body)
     starts = np.cumsum([0, *(feature.size for feature in table)])[:-1].tolist()
     return {
         "schema": SCHEMA,
@@ -70,32 +73,35 @@ def make_contract(
         "lookahead": list(task.lookahead),
         "follow_object": task.follow_object,
         "object_kinds": list(OBJECT_KINDS),
-        "inputs": [_input(feature, start) for feature, start in zip(table, starts, strict=True)],
+        "inputs": [_input(feature, start, units) for feature, start in zip(table, starts, strict=True)],
         "outputs": [
-            {"name": "action", "size": len(TARGETS), "unit": "1", "frame": "joint", "elements": list(TARGETS)},
+            {"name": "action", "size": len(targets), "unit": "1", "frame": "joint", "elements": targets},
             {
                 "name": "residual",
-                "size": len(TARGETS),
-                "unit": _UNITS,
-                "frame": "slides: base; turns and hinges: joint",
-                "elements": list(TARGETS),
+                "size": len(targets),
+                "unit": list(units.values()),
+                "frame": "the wrist's slides: base; its turns and the hand's joints: joint",
+                "elements": targets,
             },
         ],
         "conventions": {
             "quaternions": "wxyz",
             "world": "z up, the table at z = 0",
             "base": "where a demonstration's wrist orientation starts; the wrist's slides run along its axes",
-            "hand": "the wrist's body: MANO's axes, origin in the wrist joint",
+            "hand": "body `wrist`: fingers along -x (of a left hand +x), back of the hand +y; its origin is a person's "
+            "wrist joint or a robot's palm link",
             "wrist": "world_from_hand = base Rx(roll) Ry(pitch) Rz(yaw)",
         },
-        "body": _body(demonstrations),
+        "body": _body(body, units, demonstrations),
         "demonstration_format": {
             "schema": REFERENCE_SCHEMA,
             "arrays": {
                 name: {"shape": list(field.shape), "unit": field.unit, "frame": field.frame, "meaning": field.meaning}
                 for name, field in FIELDS.items()
             },
-            "scene": "name of the MJCF file beside it: hand, object (body `object`), what holds it up, table",
+            "scene": "name of the MJCF file beside it: hand, object (body `object`), what holds it up, table; surfaces "
+            "that touch stand in meshes/",
+            "digest": "SHA-256 over name and SHA-256 of each file: reference, scene, meshes in order",
         },
         "demonstrations": [dict(demonstration) for demonstration in demonstrations],
         "parity": {"with": "Brax's inference", "inputs": 10_000, "largest_difference": difference},
@@ -106,15 +112,18 @@ def make_contract(
     }
 
 
-def _input(feature: Feature, start: int) -> dict[str, Any]:
+def _input(feature: Feature, start: int, units: Mapping[str, str]) -> dict[str, Any]:
     def every(values: Any) -> list[float]:
         return [float(value) for value in np.broadcast_to(np.asarray(values, float), feature.size)]
 
+    unit: str | list[str] = feature.unit
+    if any(units.get(name, "rad") != "rad" for name in feature.elements) and unit.startswith("rad"):  # fingers' slides
+        unit = [feature.unit.replace("rad", units[name]) for name in feature.elements]
     return {
         "name": feature.name,
         "start": start,
         "size": feature.size,
-        "unit": feature.unit,
+        "unit": unit,
         "frame": feature.frame,
         "elements": list(feature.elements),
         "offset": every(feature.offset),
@@ -123,13 +132,22 @@ def _input(feature: Feature, start: int) -> dict[str, Any]:
     }
 
 
-def _body(demonstrations: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    gains = Gains()
+def _units(body: Body) -> dict[str, str]:
+    """Of each target, in order."""
+    model = body_model(body)
+    slides = {name: model.joint(name).type[0] == mujoco.mjtJoint.mjJNT_SLIDE for name in body.names.targets}
+    return {name: "m" if slide else "rad" for name, slide in slides.items()}
+
+
+def _body(body: Body, units: Mapping[str, str], demonstrations: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    gains = body.gains
     stiffness = [gains.wrist_slide[0]] * 3 + [gains.wrist_turn[0]] * 3 + gains.stiffness.tolist()
     damping = [gains.wrist_slide[1]] * 3 + [gains.wrist_turn[1]] * 3 + gains.damping.tolist()
-    limit = [None] * 6 + gains.force_limit.tolist()
+    limit = [None] * NUM_WRIST + gains.force_limit.tolist()
     return {
+        "name": body.name,
         "hand": sorted({demonstration["hand"] for demonstration in demonstrations}),
+        "fingers": list(body.fingers),
         "actuators": [
             {
                 "name": name,
@@ -139,9 +157,11 @@ def _body(demonstrations: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
                 "damping": kv,
                 "force_limit": most,
             }
-            for name, unit, kp, kv, most in zip(TARGETS, _UNITS, stiffness, damping, limit, strict=True)
+            for (name, unit), kp, kv, most in zip(units.items(), stiffness, damping, limit, strict=True)
         ],
-        "units": "stiffness N/m or N m/rad, damping N s/m or N m s/rad, force_limit N m (null: none)",
+        "coupled": [dataclasses.asdict(each) for each in body.coupled],
+        "units": "stiffness N/m or N m/rad, damping N s/m or N m s/rad, force_limit N or N m (null: none)",
+        "coupling": "joint = slope * leader + shift: joints that others move, without an actuator",
         "wrist": "carried without gravity: the body has gravity compensation, the arm is not modelled",
         "limits": "low and high of each reference",
     }

@@ -9,7 +9,7 @@ def contract_page(contract: Mapping[str, Any]) -> str:
     policy, rate, function = contract["policy"], contract["rate"], contract["function"]
     size = sum(entry["size"] for entry in contract["inputs"])
     parts = [
-        f"# Policy `{policy['experiment']}`",
+        f"# Policy `{policy['experiment']}`, hand `{contract['body']['name']}`",
         f"{policy['steps']:,} control steps of training; layers {policy['layers']}, {policy['activation']}; "
         f"{policy['precision']}. Digest `{policy['digest']}`.",
         f"A control step is {1000 / rate['control_hz']:g} ms: {rate['substeps']} physics steps of "
@@ -41,7 +41,13 @@ def contract_page(contract: Mapping[str, Any]) -> str:
                 for a in contract["body"]["actuators"]
             ),
         ),
-        _list({name: contract["body"][name] for name in ("units", "wrist", "limits")}),
+        _list(
+            {
+                "fingers": ", ".join(contract["body"]["fingers"]),
+                **{name: contract["body"][name] for name in ("units", "wrist", "limits")},
+                **{c["joint"]: f"{c['slope']:g} * {c['leader']} + {c['shift']:g}" for c in contract["body"]["coupled"]},
+            }
+        ),
         f"## Demonstrations: `{contract['demonstration_format']['schema']}`",
         _table(
             ("array", "shape", "unit", "frame", "meaning"),
@@ -50,10 +56,13 @@ def contract_page(contract: Mapping[str, Any]) -> str:
                 for name, e in contract["demonstration_format"]["arrays"].items()
             ),
         ),
-        f"`scene`: {contract['demonstration_format']['scene']}.",
+        f"`scene`: {contract['demonstration_format']['scene']}. Digest: {contract['demonstration_format']['digest']}.",
         _table(
-            ("reference", "frames", "hand", "grasp", "object"),
-            ((d["reference"], d["frames"], d["hand"], d["grasp"], d["object"]) for d in contract["demonstrations"]),
+            ("reference", "frames", "hand", "grasp", "object", "digest"),
+            (
+                (d["reference"], d["frames"], d["hand"], d["grasp"], d["object"], d["digest"])
+                for d in contract["demonstrations"]
+            ),
         ),
         "## Versions",
         _list(contract["versions"]),
@@ -70,7 +79,7 @@ def _input(entry: Mapping[str, Any]) -> tuple[Any, ...]:
         entry["start"],
         entry["size"],
         entry["name"],
-        entry["unit"],
+        _shortened(entry["unit"]),
         entry["frame"],
         *numbers,
         entry["meaning"],

@@ -9,14 +9,18 @@ import numpy as np
 
 from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
+from mjx_hand.files.digests import digest, file_piece
 from mjx_hand.player.tracking_reference import TrackingReference, save_tracking_reference
-from train.export.scene_xml import scene_xml
+from train.export.scene_xml import write_scene
 
 FOLDER = "demonstrations"
 
 
 def save_demonstrations(env: TrackingEnv, numbers: Sequence[int], folder: Path) -> list[dict[str, Any]]:
-    """Write `demonstrations/NNN.xml` and `NNN.npz` of an environment's demonstrations; what each is, for the contract.
+    """Write `demonstrations/NNN.xml`, its meshes and `NNN.npz` of an environment's demonstrations.
+
+    Returns:
+        What each is, for the contract.
 
     Raises:
         InputError: the task still helps the object when the training is over, which no player can.
@@ -50,12 +54,15 @@ def _save(env: TrackingEnv, number: int, folder: Path) -> dict[str, Any]:
         substeps=env.task.substeps,
         scene=f"{name}.xml",
     )
-    scene = scene_xml(demonstration, env.hands[number], env.task.contacts, env.task.observe_forces)
-    (folder / reference.scene).write_text(scene)
+    given = demonstration, env.hands[number], env.task.contacts, env.task.observe_forces
+    meshes = write_scene(folder / reference.scene, *given)
     save_tracking_reference(reference, folder / f"{name}.npz")
+    files = [f"{name}.npz", reference.scene, *meshes]
     return {
         "reference": f"{FOLDER}/{name}.npz",
         "scene": f"{FOLDER}/{name}.xml",
+        "meshes": [f"{FOLDER}/{mesh}" for mesh in meshes],
+        "digest": digest(file_piece(folder / file) for file in files),
         "frames": frames,
         "grasp": demonstration.grasp,
         "object": demonstration.object.kind,

@@ -9,18 +9,19 @@ from typing import Any
 
 from envs.observation import observed_features
 from envs.tracking import TrackingEnv
-from mjx_hand.bodies.human_body import HUMAN
+from mjx_hand.bodies.named_body import named_body
 from mjx_hand.errors import InputError
 from mjx_hand.player.exported_policy import ExportedPolicy, save_exported_policy
-from mjx_hand.rigid.export.mesh_folder import filling
+from mjx_hand.rigid.export.mesh_folder import MESHES, filling
 from train.experiment.bundled_policies import bundled_env, with_policy
-from train.experiment.setup import chosen_checkpoint, load_env
+from train.experiment.setup import chosen_checkpoint, chosen_path, load_env
 from train.export.c_source import save_c
 from train.export.contract import make_contract
 from train.export.contract_page import contract_page
 from train.export.demonstrations import FOLDER, save_demonstrations
 from train.export.network import difference_from_brax, exported_policy
 from train.export.onnx_file import check_onnx, save_onnx
+from train.learning.checkpoint import load_checkpoint
 from train.settings.config import Config
 
 _USUAL = 3  # demonstrations of a run
@@ -36,20 +37,22 @@ def export_policy(config: Config) -> Path:
     Raises:
         InputError: no policy, one of another task, or a folder that cannot be written.
     """
-    if config.hand != HUMAN:
-        raise InputError(f"hand is {config.hand!r}; policies of the human hand alone are exported: give hand=human")
     if "onnx" in config.export.to:
         check_onnx()
     config, included = with_policy(config)
-    size = sum(feature.size for feature in observed_features(config.task))
-    checkpoint = chosen_checkpoint(config, size)
-    bare = exported_policy(checkpoint.policy, config.task)
+    load_checkpoint(chosen_path(config))  # before anything is made for it
+    body = named_body(config.hand)
+    size = sum(feature.size for feature in observed_features(config.task, body.names, body.reach))
+    checkpoint = chosen_checkpoint(config, size, body.num_targets)
+    bare = exported_policy(checkpoint.policy, config.task, body)
     difference = difference_from_brax(bare, checkpoint.policy, config.ppo)
     env = None if config.export.demonstrations == 0 else _env(config, included)
     folder = Path(config.export.folder or Path(config.out) / "export")
     with filling(folder) as temporary:
         told = [] if env is None else save_demonstrations(env, _count(config, env), temporary)
-        policy = dataclasses.replace(bare, contract=make_contract(bare, checkpoint, config.task, difference, told))
+        policy = dataclasses.replace(
+            bare, contract=make_contract(bare, checkpoint, config.task, body, difference, told)
+        )
         _save(policy, config.export.to, temporary)
         (temporary / _CONTRACT).write_text(json.dumps(policy.contract, indent=1) + "\n")
         (temporary / "contract.md").write_text(contract_page(policy.contract))
@@ -88,13 +91,13 @@ def _digest(folder: Path) -> str:
 
 def _remove_old(folder: Path, contract: Mapping[str, Any], forms: Collection[str]) -> None:
     """Delete what an earlier export left: other forms, and demonstrations that this contract does not tell of."""
-    kept = {entry[name] for entry in contract["demonstrations"] for name in ("reference", "scene")}
+    kept = {file for d in contract["demonstrations"] for file in (d["reference"], d["scene"], *d["meshes"])}
     old = [folder / file for form, files in _FILES.items() if form not in forms for file in files]
     old += [
         path
-        for suffix in ("npz", "xml")
-        for path in (folder / FOLDER).glob(f"[0-9][0-9][0-9].{suffix}")
-        if f"{FOLDER}/{path.name}" not in kept
+        for pattern in ("[0-9][0-9][0-9].npz", "[0-9][0-9][0-9].xml", f"{MESHES}/*.obj")
+        for path in (folder / FOLDER).glob(pattern)
+        if path.relative_to(folder).as_posix() not in kept
     ]
     for path in old:
         try:

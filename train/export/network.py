@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from envs.observation import observed_features, residual_scale
 from envs.task import Task
+from mjx_hand.bodies.body import Body
 from mjx_hand.errors import InputError
 from mjx_hand.player.exported_policy import ExportedPolicy, Layer
 from mjx_hand.player.features import OBSERVATION_LIMIT, offsets_and_scales
@@ -20,17 +21,18 @@ TOLERANCE = 1e-5  # of an action, which is -1 to 1
 INPUTS = 10_000
 
 
-def exported_policy(parameters: Mapping[str, Any], task: Task) -> ExportedPolicy:
+def exported_policy(parameters: Mapping[str, Any], task: Task, body: Body) -> ExportedPolicy:
     """The policy of these parameters, without a contract.
 
     Args:
         parameters: of the policy's network, as Flax has them.
         task: that it was trained on.
+        body: that it moves.
 
     Raises:
         InputError: the network reads other features than this task has.
     """
-    table = observed_features(task)
+    table = observed_features(task, body.names, body.reach)
     offset, scale = offsets_and_scales(table)
     layers = policy_layers(parameters)
     if layers[0].kernel.shape[0] != len(offset):
@@ -45,7 +47,7 @@ def exported_policy(parameters: Mapping[str, Any], task: Task) -> ExportedPolicy
         limit=OBSERVATION_LIMIT,
         layers=layers,
         residual_start=sum(feature.size for feature in table[: names.index("residual.wrist_position")]),
-        residual_scale=residual_scale(task).astype(np.float32),
+        residual_scale=residual_scale(task, body.names, body.reach).astype(np.float32),
         smoothing=task.smoothing,
         contract={},
     )

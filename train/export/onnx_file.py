@@ -20,7 +20,7 @@ def check_onnx() -> None:
 
 
 def save_onnx(policy: ExportedPolicy, path: Path) -> None:
-    """Write the policy, `features` (batch, n) to `action` and `residual` (batch, 26), with its contract as metadata."""
+    """Write the policy, `features` (batch, n) to `action` and `residual` (batch, m), with its contract as metadata."""
     import onnx  # pyright: ignore[reportMissingImports]  # an extra
     from onnx import helper, numpy_helper  # pyright: ignore[reportMissingImports]
 

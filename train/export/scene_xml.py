@@ -1,6 +1,7 @@
 """A demonstration's scene as MJCF that plain MuJoCo loads and steps as the native engine does."""
 
 import xml.etree.ElementTree as ET
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -9,6 +10,7 @@ from envs.physics.solver import gauss_seidel
 from envs.scene import demonstration_spec
 from mjx_hand.bodies.body import Body
 from mjx_hand.motion.demonstration import Demonstration
+from mjx_hand.rigid.export.mesh_folder import write_surfaces
 from mjx_hand.rigid.rigid_hand import RigidHand
 
 _SOLVER = ("solver", "iterations", "ls_iterations", "cone", "impratio")
@@ -34,15 +36,20 @@ _TYPES = {
 }
 
 
-def scene_xml(
-    demonstration: Demonstration, hand: RigidHand | Body, contacts: str = "object", forces: bool = False
-) -> str:
-    """The scene, with the native engine's solver, in one file; the rest as `envs.scene.scene_spec` has it."""
+def write_scene(
+    path: Path, demonstration: Demonstration, hand: RigidHand | Body, contacts: str = "object", forces: bool = False
+) -> list[str]:
+    """Write the scene, with the native engine's solver; the rest as `envs.scene.scene_spec` has it.
+
+    Surfaces go to `meshes/` beside it; their paths from there on are returned.
+    """
     spec = demonstration_spec(demonstration, hand, contacts=contacts, forces=forces)
     (solved,) = gauss_seidel([spec.compile()])
     for name in _SOLVER:
         setattr(spec.option, name, getattr(solved.opt, name))
-    return exact_xml(spec)
+    meshes = write_surfaces(spec, path.parent)
+    path.write_text(exact_xml(spec))
+    return meshes
 
 
 def exact_xml(spec: mujoco.MjSpec) -> str:
@@ -67,7 +74,10 @@ def exact_xml(spec: mujoco.MjSpec) -> str:
             if "mass" in element.attrib:
                 element.set("mass", repr(float(spec.geom(element.attrib["name"]).mass)))
     for element in root.iter("mesh"):
-        element.set("vertex", _text(np.asarray(spec.mesh(element.attrib["name"]).uservert)))
+        if "vertex" in element.attrib:
+            element.set("vertex", _text(np.asarray(spec.mesh(element.attrib["name"]).uservert)))
+    for element, law in zip(root.iterfind("equality/joint"), model.eq_data, strict=True):
+        element.set("polycoef", _text(law[:5]))
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 

@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from envs.scene import NUM_WRIST
+from envs.scene import NUM_WRIST, demonstration_spec
 from envs.tracking import TrackingEnv
-from mjx_hand.bodies.human_body import person
+from mjx_hand.bodies.coordinates import hand_coordinates
 from mjx_hand.errors import InputError
-from mjx_hand.pytree import replace
-from mjx_hand.view.browser.hand_scene import object_layers, twin_layer
+from mjx_hand.view.browser.hand_scene import object_layers
+from mjx_hand.view.browser.model_layer import model_layer
 from mjx_hand.view.browser.scene import Curve, Scene
 from train.learning.unstable import Unstable, step_again
-from train.view.play_scene import ghost, posed
+from train.view.play_scene import ghost
 
 
 def unstable_scene(unstable: Unstable, env: TrackingEnv, name: str) -> Scene:
@@ -32,18 +32,17 @@ def unstable_scene(unstable: Unstable, env: TrackingEnv, name: str) -> Scene:
             f"play.unstable follows demonstration {k} in {len(unstable.qpos)} coordinates; {name!r} has "
             f"{len(env.demonstrations)} of {engine.models[0].nq}: give the config and data it was trained with"
         )
-    demonstration, hand = env.demonstrations[k], person(env.hands[k])
+    demonstration, edges = env.demonstrations[k], env.body.rigid is None
     first = env.body.num_coordinates  # of the object's coordinates
     fps = float(1 / engine.models[k].opt.timestep)
     path = step_again(engine.models[k], unstable, engine.substeps)
-    motion = posed(demonstration, path, fps)
     told = np.where(np.isfinite(unstable.targets), unstable.targets, env.body.of_targets(unstable.qpos))
-    commanded = posed(demonstration, np.repeat(told[None], len(path), axis=0), fps)
-    shown = replace(demonstration, motion=motion, object_pose=path[:, first:])
+    seen = demonstration_spec(demonstration, env.hands[k], visual=True).compile()
+    commanded = np.concatenate([hand_coordinates(seen, told), path[0, first:]])
     layers = (
-        twin_layer(motion, hand, "twin"),
-        *object_layers(shown),
-        ghost(twin_layer(commanded, hand, "commanded")),
+        model_layer(seen, path, "twin", edges=edges),
+        *object_layers(demonstration, path[:, first:]),
+        ghost(model_layer(seen, np.repeat(commanded[None], len(path), axis=0), "commanded", edges=edges)),
     )
     away = path - path[0]
     turned = np.rad2deg(np.abs(away[:, NUM_WRIST:first]).max(axis=1))

@@ -5,6 +5,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -58,9 +59,26 @@ def write_meshes(rigid: RigidHand, folder: Path, collision: str) -> None:
             write_obj(folder / MESHES / f"{hull_name(link)}.obj", vertices, faces)
 
 
+def write_surfaces(spec: mujoco.MjSpec, folder: Path) -> list[str]:
+    """Write the spec's meshes as `meshes/NAME.obj`, where it looks for them from then on; their paths in the folder.
+
+    Hulls, which are points without faces, stay in the spec.
+    """
+    surfaces = [mesh for mesh in spec.meshes if len(mesh.userface)]
+    if surfaces:
+        (folder / MESHES).mkdir(exist_ok=True)
+        spec.meshdir, spec.modelfiledir = MESHES, str(folder)
+    for mesh in surfaces:
+        mesh.file = f"{mesh.name.replace('/', '_')}.obj"
+        vertices, faces = np.array(mesh.uservert).reshape(-1, 3), np.array(mesh.userface).reshape(-1, 3)
+        write_obj(folder / MESHES / mesh.file, vertices, faces)
+        mesh.uservert, mesh.userface = [], []
+    return [f"{MESHES}/{mesh.file}" for mesh in surfaces]
+
+
 def write_obj(path: Path, vertices: Float[np.ndarray, "n 3"], faces: Int[np.ndarray, "f 3"]) -> None:
     """Triangles that share their corners, so that a closed surface stays closed."""
-    lines = [f"v {x:.7f} {y:.7f} {z:.7f}" for x, y, z in vertices.tolist()]
+    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices.tolist()]  # all digits of single precision
     lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
     path.write_text("\n".join(lines) + "\n")
 

@@ -86,9 +86,11 @@ def skinned_motion(motion: JointMotion, shape: Float[Array, "s"], rigid: RigidHa
     )
 
 
-def object_layers(demonstration: Demonstration) -> tuple[MeshLayer, ...]:
-    """The object, and the boxes that it stands on at first."""
-    pose, frames = demonstration.object_pose, demonstration.num_frames
+def object_layers(
+    demonstration: Demonstration, object_pose: Float[Array, "t 7"] | None = None
+) -> tuple[MeshLayer, ...]:
+    """The object, as demonstrated or in these poses (m, wxyz), and the boxes that it stands on at first."""
+    pose = demonstration.object_pose if object_pose is None else object_pose
     layers = [
         MeshLayer(
             name="object",
@@ -105,7 +107,7 @@ def object_layers(demonstration: Demonstration) -> tuple[MeshLayer, ...]:
             MeshLayer(
                 name="support",
                 meshes=tuple((np.asarray(box.vertices), np.asarray(box.faces)) for box in boxes),
-                transforms=np.broadcast_to(standing, (frames, *standing.shape)),
+                transforms=np.broadcast_to(standing, (len(pose), *standing.shape)),
                 colour=SUPPORT,
                 edges=True,
             )
