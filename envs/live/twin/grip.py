@@ -16,11 +16,12 @@ from mjx_hand.hand.joints import FINGERS, HINGES, LINKS, NUM_HINGES
 from mjx_hand.rigid.gains import Gains
 
 NEAR = 0.008  # m: a phalanx that is closer to the object is taken to touch
-_SAFETY = 4.0  # times the force that just holds the object's weight by friction between thumb and fingers
+_SAFETY = 8.0  # times the force that just holds the object's weight by friction between thumb and fingers
 _LEAST = 2.0  # N
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
+_STEADY = 0.8  # s: of the low-pass of a holding hand's fingers, whose trembling would shake out what they hold
 _SOON = 0.15  # s over which a grip is taken up and let go: a finger that comes near does not snap shut
-_WRAP_TORQUE = 0.5  # of their torque limits, with which flexing joints close around an object
+_WRAP_TORQUE = 0.75  # of their torque limits, with which flexing joints close around an object
 _WRAPS, _LETS_GO = 7, 2  # phalanges of other fingers than the thumb that are near when a hand begins and ends to wrap
 _FLEXES = np.array([name.endswith("_flexion") for name in HINGES])
 _THUMB = FINGERS.index("thumb")
@@ -54,15 +55,23 @@ class Grip:
         self._force = max(_LEAST, grip_force_of(mass, friction, _SAFETY / 2))
         self._jacobian = np.zeros((3, model.nv))
         self._offsets = np.zeros(NUM_HINGES)
-        self._wraps = False
+        self._wraps = self._holds = False
+        self._steady = np.zeros(NUM_HINGES)
 
-    def offsets(self, data: mujoco.MjData, seconds: float) -> Float[np.ndarray, "20"]:
-        """What to add to the hinges' targets (rad).
+    def pressing(self, angles: Float[np.ndarray, "20"], data: mujoco.MjData, seconds: float) -> Float[np.ndarray, "20"]:
+        """What to tell the hinges (rad) in place of where the fingers are tracked.
 
         Args:
+            angles: as tracked.
             data: as the last step left it.
             seconds: since the last call.
         """
+        pressed = self._pressed(data, seconds)
+        self._steady += (min(1.0, seconds / _STEADY) if self._holds else 1.0) * (angles - self._steady)
+        return self._steady + pressed
+
+    def _pressed(self, data: mujoco.MjData, seconds: float) -> Float[np.ndarray, "20"]:
+        """What to add to the hinges' targets (rad)."""
         torque, rows, gaps = np.zeros(NUM_HINGES), [], []
         nearest = self._nearest(data)
         fingers = {(link - 1) // 3 for link in nearest if link > 0}
@@ -85,6 +94,7 @@ class Grip:
         around = sum(link > 0 and (link - 1) // 3 != _THUMB for link in nearest)
         # What slips touches less: a grip that weakened with it would let go.
         self._wraps = around > _LETS_GO if self._wraps else around >= _WRAPS
+        self._holds = self._wraps or (others > 0 and _THUMB in fingers)
         if self._wraps:
             wanted = _WRAP_TORQUE * _FLEXES * limit / self._gains.stiffness
         self._offsets += min(1.0, seconds / _SOON) * (wanted - self._offsets)

@@ -70,7 +70,7 @@ class World:
         self._wrist.keep_regular()
         angles = target.angles
         if self._grip is not None:
-            angles = angles + self._grip.offsets(self.data, self.timestep)
+            angles = self._grip.pressing(angles, self.data, self.timestep)
         wanted = np.concatenate([self._wrist.coordinates(target.position, target.quaternion), angles])
         self.data.ctrl[:] = np.clip(wanted, self._low, self._high)
         mujoco.mj_step(self.model, self.data)

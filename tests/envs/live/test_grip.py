@@ -6,14 +6,16 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from envs.grasps import grasp_type
+from envs.grasps.grasp_type import Wrap
 from envs.live.twin.pose import HandPose
 from envs.live.twin.tabletop import Tabletop
 from envs.live.twin.world import World
-from mjx_hand.hand.joints import FINGERS
+from mjx_hand.hand.joints import FINGERS, HINGES, LINKS
 from mjx_hand.hand.load import load_hand
 from mjx_hand.objects.description import ObjectDescription
 from mjx_hand.rigid.build import build_rigid_hand
-from mjx_hand.rigid.rigid_hand import finger_tips
+from mjx_hand.rigid.gains import Gains
+from mjx_hand.rigid.rigid_hand import finger_tips, forward_kinematics
 
 MASS, FRICTION = 0.4, 0.9
 
@@ -83,3 +85,49 @@ def test_what_is_only_near_is_no_touch(pinching):
     near = World(rigid, Tabletop(thinner, table.pose, table.support, table.support_position, "cube"), pose, "grip")
     near.step(pose)
     assert all(np.linalg.norm(touch.force) > 0 for touch in near.touches())
+
+
+@pytest.fixture(scope="module")
+def fist():
+    """A fist around a handle that hangs in the air, and its table."""
+    rigid, grasp = build_rigid_hand(load_hand()), grasp_type("power")
+    angles, turn = np.array(grasp.posture), Rotation.from_matrix(np.array(grasp.wrist_rotation))
+    knuckle = np.asarray(forward_kinematics(jnp.asarray(angles), rigid)[1])[LINKS.index("middle1")]
+    assert isinstance(grasp.closing, Wrap)
+    centre = turn.apply(knuckle + np.array(grasp.closing.place))
+    pose = HandPose(np.array([0.0, 0.0, 0.4]) - centre, turn.as_quat(scalar_first=True), angles)
+    handle = ObjectDescription(size=np.array([0.019, 0.1, 0.0]), mass=1.5, friction=0.7, kind="capsule")
+    lies = Rotation.from_matrix(np.array(grasp.object_rotation)).as_quat(scalar_first=True)
+    return rigid, pose, Tabletop(handle, np.array([0, 0, 0.4, *lies]), np.zeros((0, 3)), np.zeros((0, 3)), "handle")
+
+
+def told(world: World, pose: HandPose, steps: int) -> np.ndarray:
+    """What the hinges are told at the end; the object is held where it is by hand."""
+    start = world.data.qpos[-7:].copy()
+    for _ in range(steps):
+        world.step(pose)
+        world.data.qpos[-7:], world.data.qvel[-6:] = start, 0
+    return world.data.ctrl[6:].copy()
+
+
+def test_a_fist_closes_with_every_flexing_joint_and_opens_again(fist):
+    rigid, pose, table = fist
+    world, gains = World(rigid, table, pose, "grip"), Gains()
+    flexes = np.array([name.endswith("_flexion") for name in HINGES])
+    asked = np.clip(
+        pose.angles + 0.75 * flexes * gains.force_limit / gains.stiffness, *world.model.actuator_ctrlrange[6:26].T
+    )
+    np.testing.assert_allclose(told(world, pose, 300), asked, atol=0.01)
+    opened = HandPose(pose.position, pose.quaternion, np.zeros(20))
+    away = [name.startswith(("middle", "ring")) for name in HINGES]  # of a flat hand others are still near the handle
+    np.testing.assert_allclose(told(world, opened, 1500)[away], 0.0, atol=0.02)
+
+
+def test_a_holding_hand_does_not_pass_on_the_trackers_trembling(fist):
+    rigid, pose, table = fist
+    world, rng, heard = World(rigid, table, pose, "grip"), np.random.default_rng(0), []
+    told(world, pose, 300)
+    for _ in range(60):
+        shaken = HandPose(pose.position, pose.quaternion, pose.angles + 0.1 * rng.normal(size=20))
+        heard.append(told(world, shaken, 8))  # 31 poses a second
+    assert np.std(heard, axis=0).max() < 0.03
