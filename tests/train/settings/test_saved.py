@@ -1,0 +1,33 @@
+"""Settings of runs from before there were some options."""
+
+import pytest
+
+from mjx_hand.errors import InputError
+from train.settings.config import compose
+from train.settings.saved import differing, read_settings, settings_of, with_settings_of, write_settings
+
+SINCE = ("task.wrap_torque", "task.termination_angle")
+
+
+@pytest.fixture
+def older(tmp_path):
+    """A run's settings, without the options that came after it."""
+    write_settings(compose(["config=power"]), tmp_path / "config.yaml")
+    told = read_settings(tmp_path / "config.yaml")
+    assert set(SINCE) <= set(told)
+    return {option: value for option, value in told.items() if option not in SINCE}
+
+
+def test_an_older_run_goes_on_as_it_was_made(older):
+    now = compose(["config=power"])
+    assert (now.task.wrap_torque, now.task.termination_angle) == (0.5, 0.5)
+    then = with_settings_of(now, older, {"config"}, "the run")
+    assert (then.task.wrap_torque, then.task.termination_angle) == (0.0, None)
+    assert differing(older, settings_of(then)) == []
+    assert differing(older, settings_of(now)) == sorted(SINCE)
+
+
+def test_what_it_was_not_made_with_is_refused(older):
+    given = compose(["config=power", "task.wrap_torque=0.5"])
+    with pytest.raises(InputError, match=r"the run holds a training with task.wrap_torque=0.0, now 0.5"):
+        with_settings_of(given, older, {"config", "task.wrap_torque"}, "the run")
