@@ -27,7 +27,7 @@ from mjx_hand.rigid.rigid_hand import RigidHand
 _NEAR = 0.007  # m: a phalanx whose skin is closer than this is taken to touch
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
 _ALONG = np.linspace(0.0, 1.0, 5)
-_WRAPS = 6.0  # of the fingers' twelve phalanges: with more that touch a hand wraps; a pinch has up to 5
+WRAPS, _SURE = 2.5, 0.1  # fingers: with three that touch with two phalanges each, a hand wraps; a pinch has up to two
 _FLEXES = np.array([name.endswith("_flexion") for name in HINGES])
 
 
@@ -59,8 +59,8 @@ def grip_offsets(
         force: newtons.
         gains: of the position controllers that the offsets are given to.
         planes: of a mesh (`mjx_hand.objects.primitives.hull_planes`).
-        wrap_torque: share of its torque limit with which every flexing joint closes in place of all that, while more
-            than half of the fingers' phalanges touch; with 0 a hand that wraps presses like any other.
+        wrap_torque: share of its torque limit with which every flexing joint closes in place of all that, while three
+            fingers or more touch with two phalanges each; with 0 a hand that wraps presses like any other.
     """
     pads = jnp.array([k for k, link in enumerate(rigid.capsule_links) if link > 0])
     links = [LINKS[link] for link in rigid.capsule_links if link > 0]
@@ -96,7 +96,8 @@ def grip_offsets(
         pressing = closing + jnp.clip(torque, -limit, limit) / stiffness
         if not wrap_torque:
             return pressing
-        wraps = jax.nn.sigmoid((jnp.sum(phalanges * ~thumb) - _WRAPS) / 0.3)
+        around = jnp.sum(jnp.clip(phalanges - 1.0, 0.0, 1.0) * ~thumb)
+        wraps = jax.nn.sigmoid((around - WRAPS) / _SURE)
         return (1 - wraps) * pressing + wraps * wrap_torque * limit * _FLEXES / stiffness
 
     return jax.lax.map(lambda row: one(*row), (angles, *object_in_hand), batch_size=64)

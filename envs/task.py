@@ -36,7 +36,7 @@ class Task:
         grip_force: force (N) with which the reference presses fingers that touch; 0 leaves demonstrations as they are,
             null takes that of each demonstration's grasp type.
         wrap_torque: share of its torque limit with which each flexing joint closes where the reference's hand is around
-            an object, more than half of the fingers' phalanges touching; 0 presses there as anywhere.
+            an object, most fingers touching it with two phalanges each; 0 presses there as anywhere.
         lookahead: how many frames ahead the policy sees the reference.
         follow_object: whether the wrist's path goes to where the object is seen to stand, and back to the demonstrated
             one once it is held (`mjx_hand.player.approach`).

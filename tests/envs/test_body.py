@@ -68,7 +68,7 @@ def test_a_body_that_wraps_closes_with_what_its_joints_can(demonstrations, bodie
         found = model_grips([told], bodies[:1], targets, np.array([8.0]), gains, wrap_torque=0.5)[0, :, NUM_WRIST:]
         flexes = np.array([name.endswith("_flexion") for name in HINGES])
         closed = 0.5 * flexes * gains.force_limit / gains.stiffness
-        np.testing.assert_allclose(found, np.broadcast_to(closed * closes, found.shape), atol=1e-6)
+        np.testing.assert_allclose(found, np.broadcast_to(closed * closes, found.shape), atol=2e-4)
 
 
 def test_no_grip_where_none_is_asked_for(demonstrations, bodies):

@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from envs.grip import grip_offsets
+from envs.grip_table import grip_table
 from envs.scene import NUM_WRIST, OBJECT, demonstration_spec
 from mjx_hand.hand.joints import HINGES
 from mjx_hand.objects.description import OBJECT_KINDS
@@ -123,3 +124,11 @@ def test_a_hand_that_wraps_closes_with_every_flexing_joint(demonstrations, hands
     closing = np.where(flexing, 0.5 * gains.force_limit / gains.stiffness, 0.0)
     np.testing.assert_allclose(found, closing if closes else without, atol=1e-4)
     assert np.abs(without).max() > 1e-3
+
+
+def test_a_pinch_is_no_wrap(demonstrations, hands, env):
+    """Two fingers touch with up to three phalanges each, and nothing of what a wrap adds may reach the others."""
+    targets, forces = env.reference.targets, np.full(len(demonstrations), 2.0)
+    wrapped, plain = (grip_table(demonstrations, hands, targets, forces, Gains(), share) for share in (0.5, 0.0))
+    np.testing.assert_allclose(wrapped, plain, atol=0.02)
+    assert np.abs(np.asarray(wrapped) - np.asarray(plain)).mean() < 1e-3

@@ -6,6 +6,8 @@ phalanges; a hand whose thumb does not touch presses against the palm; one that 
 what its flexing joints can. Here contacts and derivatives are the C engine's, at the very state.
 """
 
+from collections import Counter
+
 import mujoco
 import numpy as np
 from jaxtyping import Float
@@ -22,7 +24,8 @@ _DAMPING = 0.01  # m/rad, of the step that closes gaps
 _STEADY = 0.8  # s: of the low-pass of a holding hand's fingers, whose trembling would shake out what they hold
 _SOON = 0.15  # s over which a grip is taken up and let go: a finger that comes near does not snap shut
 _WRAP_TORQUE = 0.75  # of their torque limits, with which flexing joints close around an object
-_WRAPS, _LETS_GO = 7, 2  # phalanges of other fingers than the thumb that are near when a hand begins and ends to wrap
+# Fingers besides the thumb that are near with two phalanges where a hand begins to wrap, and phalanges when it ends.
+_WRAPS, _LETS_GO = 3, 2
 _FLEXES = np.array([name.endswith("_flexion") for name in HINGES])
 _THUMB = FINGERS.index("thumb")
 _HINGES = slice(NUM_WRIST, NUM_WRIST + NUM_HINGES)
@@ -91,9 +94,10 @@ class Grip:
         if rows:  # and a damped least-squares step that closes the gaps
             lever = np.stack(rows)
             wanted += lever.T @ np.linalg.solve(lever @ lever.T + _DAMPING**2 * np.eye(len(rows)), np.array(gaps))
-        around = sum(link > 0 and (link - 1) // 3 != _THUMB for link in nearest)
+        near = Counter((link - 1) // 3 for link in nearest if link > 0 and (link - 1) // 3 != _THUMB)
+        around = sum(count > 1 for count in near.values())
         # What slips touches less: a grip that weakened with it would let go.
-        self._wraps = around > _LETS_GO if self._wraps else around >= _WRAPS
+        self._wraps = near.total() > _LETS_GO if self._wraps else around >= _WRAPS
         self._holds = self._wraps or (others > 0 and _THUMB in fingers)
         if self._wraps:
             wanted = _WRAP_TORQUE * _FLEXES * limit / self._gains.stiffness
