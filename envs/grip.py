@@ -27,7 +27,7 @@ from mjx_hand.rigid.rigid_hand import RigidHand
 _NEAR = 0.007  # m: a phalanx whose skin is closer than this is taken to touch
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
 _ALONG = np.linspace(0.0, 1.0, 5)
-WRAPS, _SURE = 2.5, 0.1  # fingers: with three that touch with two phalanges each, a hand wraps; a pinch has up to two
+WRAPS, SURE = 2.5, 0.03  # fingers: with three that touch with two phalanges each, a hand wraps; a pinch has up to two
 _FLEXES = np.array([name.endswith("_flexion") for name in HINGES])
 
 
@@ -97,7 +97,7 @@ def grip_offsets(
         if not wrap_torque:
             return pressing
         around = jnp.sum(jnp.clip(phalanges - 1.0, 0.0, 1.0) * ~thumb)
-        wraps = jax.nn.sigmoid((around - WRAPS) / _SURE)
+        wraps = jax.nn.sigmoid((around - WRAPS) / SURE)
         return (1 - wraps) * pressing + wraps * wrap_torque * limit * _FLEXES / stiffness
 
     return jax.lax.map(lambda row: one(*row), (angles, *object_in_hand), batch_size=64)

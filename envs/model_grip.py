@@ -19,7 +19,7 @@ NEAR = 0.007  # m: a link nearer than this is taken to touch
 _SHARP = 0.001  # m, over which that fades
 _FAR = 0.02  # m, beyond which nobody asks how far
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
-WRAPS, _SURE = 0.7, 0.1  # share of the other fingers that touch with two links where a hand wraps; fingers, to be sure
+WRAPS, SURE = 0.7, 0.03  # share of the other fingers that touch with two links where a hand wraps; fingers, to be sure
 _SIDES = 32  # of a cylinder's rim
 _APART = 1e-4  # m that a link is moved out to see which way the surface faces where it just touches
 
@@ -182,4 +182,4 @@ def _offsets(
     others = {name for name, leads in zip(touch.fingers, opposing, strict=True) if not leads}
     around = np.clip(phalanges - 1.0, 0.0, 1.0)[~leads].sum() - WRAPS * len(others)
     pressed = step + np.clip(torque, -gains.force_limit, gains.force_limit) / gains.stiffness
-    return pressed, float(expit(around / _SURE))
+    return pressed, float(expit(around / SURE))

@@ -10,7 +10,7 @@ from jaxtyping import Array, Float, Int
 from scipy.spatial.transform import Rotation
 
 from envs import model_grip
-from envs.grip import WRAPS
+from envs.grip import SURE, WRAPS
 from envs.grip_table import RECORDED_RAMP, grip_forces, grip_table, padded, people_of
 from envs.scene import base_rotation, wrist_coordinates
 from mjx_hand.bodies.body import Body
@@ -121,7 +121,8 @@ def cached_reference(
         return {field.name: np.asarray(getattr(made, field.name)) for field in dataclasses.fields(made)}
 
     bare = [_ingredient(hand) for hand in hands]
-    told = grip_force, wrap_torque, dataclasses.astuple(gains), RECORDED_RAMP, WRAPS, model_grip.WRAPS
+    rules = RECORDED_RAMP, WRAPS, SURE, model_grip.WRAPS, model_grip.SURE
+    told = grip_force, wrap_torque, dataclasses.astuple(gains), *rules
     arrays = cached(compute, list(demonstrations), bare, *told)
     return Reference(**{name: jnp.asarray(array) for name, array in arrays.items()})
 

@@ -37,8 +37,8 @@ def test_on_a_gpu_the_preset_and_warp_are_chosen(gpu, monkeypatch):
 def test_a_preset_changes_the_learner_alone_and_budgets_stay_those_of_the_experiment():
     cpu, gpu = (compose(["config=spherical", f"device={name}"]) for name in ("cpu", "gpu"))
     assert (cpu.task, cpu.data, cpu.checks) == (gpu.task, gpu.data, gpu.checks)
-    assert cpu.ppo.num_updates == gpu.ppo.num_updates == 300, "an experiment's own budget is one of updates"
-    assert gpu.ppo.budget * gpu.ppo.steps_per_update == 300 * 8192 * gpu.ppo.unroll_length
+    assert cpu.ppo.num_updates == gpu.ppo.num_updates == 200, "an experiment's own budget is one of updates"
+    assert gpu.ppo.budget * gpu.ppo.steps_per_update == 200 * 8192 * gpu.ppo.unroll_length
 
 
 def test_an_experiment_and_the_command_line_win_over_a_preset():
