@@ -5,8 +5,7 @@ from the demonstration and the object's shape alone, without simulation. Added t
 for some time; the policy's residual does the rest.
 
 A hand that wraps an object closes instead: its phalanges touch all around, where J^T f of a push along the surface's
-normal hardly turns a joint, and what holds is that every flexing joint pulls. On held-out demonstrations of the three
-types that wrap, J^T f holds at most 5 % by itself, whatever the force, half of the joints' torque 68 to 98 %.
+normal hardly turns a joint, and what holds is that every flexing joint pulls (docs/demonstrations.md has figures).
 
 The same press is computed in two more places, each from other contacts: `envs.model_grip` for any body from the C
 engine's distances between its geoms, which are no capsules, and `envs.live.twin.grip` for one state in real time from
@@ -27,7 +26,8 @@ from mjx_hand.rigid.rigid_hand import RigidHand
 _NEAR = 0.007  # m: a phalanx whose skin is closer than this is taken to touch
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
 _ALONG = np.linspace(0.0, 1.0, 5)
-WRAPS, SURE = 2.5, 0.03  # fingers: with three that touch with two phalanges each, a hand wraps; a pinch has up to two
+# Fingers besides the thumb: with three that touch with two phalanges each a hand wraps, a pinch has two of them.
+_WRAPS, _SURE = 2.5, 0.03
 _FLEXES = np.array([name.endswith("_flexion") for name in HINGES])
 
 
@@ -97,7 +97,7 @@ def grip_offsets(
         if not wrap_torque:
             return pressing
         around = jnp.sum(jnp.clip(phalanges - 1.0, 0.0, 1.0) * ~thumb)
-        wraps = jax.nn.sigmoid((around - WRAPS) / SURE)
+        wraps = jax.nn.sigmoid((around - _WRAPS) / _SURE)
         return (1 - wraps) * pressing + wraps * wrap_torque * limit * _FLEXES / stiffness
 
     return jax.lax.map(lambda row: one(*row), (angles, *object_in_hand), batch_size=64)

@@ -19,7 +19,7 @@ NEAR = 0.007  # m: a link nearer than this is taken to touch
 _SHARP = 0.001  # m, over which that fades
 _FAR = 0.02  # m, beyond which nobody asks how far
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
-WRAPS, SURE = 0.7, 0.03  # share of the other fingers that touch with two links where a hand wraps; fingers, to be sure
+_WRAPS, _SURE = 2.5, 0.03  # as in `envs.grip`; a hand with fewer fingers wraps with all of them
 _SIDES = 32  # of a cylinder's rim
 _APART = 1e-4  # m that a link is moved out to see which way the surface faces where it just touches
 
@@ -134,8 +134,8 @@ def model_grips(
     """The grip (rad) of each demonstration at a force (N); NaN leaves it as it is.
 
     As `envs.grip.grip_offsets`: one damped step that closes the gaps of links that touch, and J^T f / kp, where the
-    opposing fingers press with the force and the others share as much. A hand that wraps, most of whose other fingers
-    touch with two links each, closes with `wrap_torque` of its joints' limits instead.
+    opposing fingers press with the force and the others share as much. A hand that wraps, three of whose other fingers
+    (or all, of two) touch with two links each, closes with `wrap_torque` of its joints' limits instead.
     """
     grips = np.zeros_like(targets)
     for k, (d, body) in enumerate(zip(demonstrations, bodies, strict=True)):
@@ -179,7 +179,8 @@ def _offsets(
     closing = rows * touching[:, None]
     square = closing @ closing.T + _DAMPING**2 * np.eye(len(rows))
     step = closing.T @ np.linalg.solve(square, gaps * touching)
-    others = {name for name, leads in zip(touch.fingers, opposing, strict=True) if not leads}
-    around = np.clip(phalanges - 1.0, 0.0, 1.0)[~leads].sum() - WRAPS * len(others)
+    others = len({name for name, leads in zip(touch.fingers, opposing, strict=True) if not leads})
+    around = np.clip(phalanges - 1.0, 0.0, 1.0)[~leads].sum()
+    wraps = expit((around - min(_WRAPS, others - 0.5)) / _SURE) if others > 1 else 0.0
     pressed = step + np.clip(torque, -gains.force_limit, gains.force_limit) / gains.stiffness
-    return pressed, float(expit(around / SURE))
+    return pressed, float(wraps)

@@ -9,9 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 from scipy.spatial.transform import Rotation
 
-from envs import model_grip
-from envs.grip import SURE, WRAPS
-from envs.grip_table import RECORDED_RAMP, grip_forces, grip_table, padded, people_of
+from envs.grip_table import grip_forces, grip_table, padded, people_of
 from envs.scene import base_rotation, wrist_coordinates
 from mjx_hand.bodies.body import Body
 from mjx_hand.bodies.body_places import body_model, model_places
@@ -121,8 +119,7 @@ def cached_reference(
         return {field.name: np.asarray(getattr(made, field.name)) for field in dataclasses.fields(made)}
 
     bare = [_ingredient(hand) for hand in hands]
-    rules = RECORDED_RAMP, WRAPS, SURE, model_grip.WRAPS, model_grip.SURE
-    told = grip_force, wrap_torque, dataclasses.astuple(gains), *rules
+    told = grip_force, wrap_torque, dataclasses.astuple(gains)
     arrays = cached(compute, list(demonstrations), bare, *told)
     return Reference(**{name: jnp.asarray(array) for name, array in arrays.items()})
 

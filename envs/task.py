@@ -36,7 +36,7 @@ class Task:
         grip_force: force (N) with which the reference presses fingers that touch; 0 leaves demonstrations as they are,
             null takes that of each demonstration's grasp type.
         wrap_torque: share of its torque limit with which each flexing joint closes where the reference's hand is around
-            an object, most fingers touching it with two phalanges each; 0 presses there as anywhere.
+            an object, three fingers touching it with two phalanges each; with 0, or a grip_force of 0, it does not.
         lookahead: how many frames ahead the policy sees the reference.
         follow_object: whether the wrist's path goes to where the object is seen to stand, and back to the demonstrated
             one once it is held (`mjx_hand.player.approach`).
@@ -56,7 +56,7 @@ class Task:
     reward_rotation_alpha: float = 2.0
     termination_distance: float = 0.08
     termination_distance_last: float | None = None
-    termination_angle: float | None = 0.5
+    termination_angle: float | None = None
     assist: float = 0.0
     assist_until: float = 0.5
     random_start_prob: float = 0.7

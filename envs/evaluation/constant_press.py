@@ -15,12 +15,13 @@ from jaxtyping import Array, Float
 from envs.evaluation.evaluate import evaluate_in
 from envs.evaluation.roll_out import make_roll_out, zero_residual
 from envs.grasps import grasp_names, grasp_type
-from envs.grasps.grasp_type import Pads, Wrap, wrap_torque
+from envs.grasps.grasp_type import Pads, Wrap, closing_torque
 from envs.grip_force import closing_ramp
 from envs.grip_table import grip_forces, grip_table
 from envs.scene import NUM_WRIST
 from envs.tracking import TrackingEnv
 from envs.twin import Tables
+from mjx_hand.bodies.closing import closing_directions
 from mjx_hand.files.array_cache import cached, model_bytes
 from mjx_hand.motion.demonstration import Demonstration
 
@@ -82,10 +83,8 @@ def constant_press(env: TrackingEnv) -> ConstantPress:
     press = np.array((one - contact) * np.nan_to_num(pressing)[:, None, None])
     for k, d in enumerate(env.demonstrations):
         if full[d.grasp] is None:
-            closing = grasp_type(d.grasp).closing
-            assert isinstance(closing, Wrap)
             ramp = closing_ramp(d, press.shape[1], _RAMP)
-            press[k, :, NUM_WRIST:] = ramp[:, None] * wrap_torque(closing) / env.gains.stiffness
+            press[k, :, NUM_WRIST:] = ramp[:, None] * _closing_torque(d, env) / env.gains.stiffness
     return ConstantPress(env, full, contact, jnp.asarray(press, jnp.float32))
 
 
@@ -119,13 +118,20 @@ def search_press(env: TrackingEnv, hold: float) -> dict[str, float]:
     }
 
 
+def _closing_torque(demonstration: Demonstration, env: TrackingEnv) -> Float[np.ndarray, "j"]:
+    """The torques (N m) of a wrap at full strength: of a human hand its type's, of another what its joints have."""
+    closing = grasp_type(demonstration.grasp).closing
+    assert isinstance(closing, Wrap)
+    if env.body.rigid is not None:
+        return closing_torque(closing)
+    return closing_directions(env.body) * env.gains.force_limit
+
+
 def _full(demonstration: Demonstration, env: TrackingEnv, force: float) -> float | None:
     """Newtons of full strength, or None where the demonstration's type wraps; `force` is the reference's own."""
     if demonstration.grasp in grasp_names():
         closing = grasp_type(demonstration.grasp).closing
         if isinstance(closing, Pads):
             return closing.force
-        if env.body.rigid is not None:
-            return None
-        # The torques of a wrap are those of human hinges; another hand presses with a force on every link that touches.
+        return None
     return _UNKNOWN_FULL * force

@@ -130,7 +130,7 @@ class GraspType:
             )
 
 
-def wrap_torque(closing: Wrap) -> Float[np.ndarray, "j"]:
+def closing_torque(closing: Wrap) -> Float[np.ndarray, "j"]:
     """The torques (N m) of all hinges with which a wrap closes, in the order of `hand.joints.HINGES`."""
     each = [closing.thumb_torque if finger == "thumb" else closing.finger_torque for finger in FINGERS]
     return np.concatenate([[0.0, *torque] for torque in each])

@@ -55,8 +55,9 @@ VARIANTS = (
         ("data.capture.refine=tips",),
     ),
     Variant("no grip", "grip", "The residual alone must press.", ("task.grip_force=0",)),
-    Variant("grip of 1 N", "grip", "Lighter or harder than the type's own.", ("task.grip_force=1",)),
-    Variant("grip of 4 N", "grip", "Lighter or harder than the type's own.", ("task.grip_force=4",)),
+    Variant("grip of 1 N", "grip", "Lighter than the type's own where pads press.", ("task.grip_force=1",)),
+    Variant("grip of 4 N", "grip", "Harder than the type's own where pads press.", ("task.grip_force=4",)),
+    Variant("wraps press", "grip", "A hand around an object presses like any other.", ("task.wrap_torque=0",)),
     Variant(
         "no rotation reward",
         "reward",
@@ -76,7 +77,12 @@ VARIANTS = (
         "The distance that ends an episode shrinks from 8 to 3 cm.",
         ("task.termination_distance_last=0.03",),
     ),
-    Variant("no early end", "episodes", "A lost object ends no episode.", ("task.termination_distance=100",)),
+    Variant(
+        "no early end",
+        "episodes",
+        "A lost object ends no episode.",
+        ("task.termination_distance=100", "task.termination_angle=null"),
+    ),
     Variant(
         "virtual object controller",
         "episodes",

@@ -37,6 +37,9 @@ _FREE = (
     "export",
     "checks",
     "data.folder",
+    "data.sealed_people",
+    "data.sealed_trials",
+    "data.sealed_seed",
     "device",
     "ppo.num_updates",
     "ppo.num_timesteps",
@@ -46,7 +49,7 @@ _POLICY = ("name", "data", "hand", "task", "ppo.policy_layers")  # what a policy
 _RECORDING = ("data.recording",)  # of no account where the demonstrations are of no recording
 _FREE_OF_POLICY = ("engine",)  # any engine may play it
 # What runs were made with from before there were these options, where that is not the default that they came with.
-_BEFORE = {"task.wrap_torque": 0.0, "task.termination_angle": None}
+_BEFORE = {"task.wrap_torque": 0.0}
 
 Settings = Mapping[str, Any]
 
@@ -64,7 +67,7 @@ def policy_settings(config: Config) -> Settings:
 
 def differing(before: Settings, now: Settings) -> list[str]:
     """The options that differ. One that there was not yet when `before` was written had `_BEFORE`, or its default."""
-    usual = {option: value for option, value in (settings_of(Config()) | _BEFORE).items() if option in now}
+    usual = {option: value for option, value in {**settings_of(Config()), **_BEFORE}.items() if option in now}
     was = _renamed(before)
     if not any(_is(option, _RECORDING) for option in now):
         was = {option: value for option, value in was.items() if not _is(option, _RECORDING)}
@@ -77,7 +80,7 @@ def contradiction(what: str, before: Settings, now: Settings) -> str:
     options = differing(before, now)
     if not options:
         return ""
-    usual, others = settings_of(Config()) | _BEFORE, f" and {len(options) - 1} more" if len(options) > 1 else ""
+    usual, others = {**settings_of(Config()), **_BEFORE}, f" and {len(options) - 1} more" if len(options) > 1 else ""
     was = _renamed(before).get(options[0], usual.get(options[0]))
     return f"{what} holds a training with {options[0]}={was}, now {now.get(options[0])}{others}"
 

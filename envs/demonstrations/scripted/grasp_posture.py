@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 from scipy.optimize import nnls
 
 from envs.grasps import GraspType, Pads, Wrap
-from envs.grasps.grasp_type import wrap_torque
+from envs.grasps.grasp_type import closing_torque
 from mjx_hand.hand.joints import LINKS, NUM_HINGES
 from mjx_hand.objects.description import ObjectDescription
 from mjx_hand.objects.primitives import face_along, half_extents, hull_planes, signed_distance
@@ -72,7 +72,7 @@ def squeeze_angles(closing: Pads | Wrap, posture: Posture, gains: Gains) -> Floa
     harder squeeze makes a pinch worse.
     """
     if isinstance(closing, Wrap):
-        torque = wrap_torque(closing)
+        torque = closing_torque(closing)
     else:
         inward = -np.asarray(posture.contact_normal)
         points, jacobian = np.asarray(posture.contact_point), np.asarray(posture.contact_jacobian)

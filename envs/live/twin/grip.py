@@ -60,6 +60,7 @@ class Grip:
         self._offsets = np.zeros(NUM_HINGES)
         self._wraps = self._holds = False
         self._steady = np.zeros(NUM_HINGES)
+        self._behind = np.zeros(NUM_HINGES)
 
     def pressing(self, angles: Float[np.ndarray, "20"], data: mujoco.MjData, seconds: float) -> Float[np.ndarray, "20"]:
         """What to tell the hinges (rad) in place of where the fingers are tracked.
@@ -70,7 +71,11 @@ class Grip:
             seconds: since the last call.
         """
         pressed = self._pressed(data, seconds)
-        self._steady += (min(1.0, seconds / _STEADY) if self._holds else 1.0) * (angles - self._steady)
+        if self._holds:
+            self._steady += min(1.0, seconds / _STEADY) * (angles - self._steady)
+        else:  # what the low-pass is behind by is made up for, not jumped
+            self._steady = angles + (1.0 - min(1.0, seconds / _SOON)) * self._behind
+        self._behind = self._steady - angles
         return self._steady + pressed
 
     def _pressed(self, data: mujoco.MjData, seconds: float) -> Float[np.ndarray, "20"]:

@@ -20,6 +20,7 @@ None of this could be checked on a recording. Cameras, images and segmentations 
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -48,15 +49,26 @@ def _recognises(path: Path, contents: Contents) -> bool:
     return bool(_present(path))
 
 
+def _frames(file: Path) -> dict[int, dict[str, Any]]:
+    """What the file says of each frame, by its number, in their order."""
+    contents = read_contents(file)
+    numbered = {int(name): frame for name, frame in contents.items() if str(name).isdecimal()}
+    if not numbered or len(numbered) < len(contents) or not all(isinstance(each, dict) for each in numbered.values()):
+        raise InputError(
+            f"{file}: not a dictionary of frames, by number, with {' and '.join(_LAYOUT)}; get TACO's own file again"
+        )
+    missing = max(numbered) + 1 - min(numbered) - len(numbered)
+    if missing:
+        raise InputError(f"{file}: {missing} of the frames between its first and last are left out; get the file again")
+    return dict(sorted(numbered.items()))
+
+
 def _rows(file: Path) -> Float[np.ndarray, "t 51"]:
     """Pose and translation of each frame."""
-    frames = read_contents(file)
-    named = all(isinstance(name, str) for name in frames) or all(isinstance(name, int) for name in frames)
-    if not frames or not named or not all(isinstance(frame, dict) for frame in frames.values()):
-        raise InputError(f"{file}: not a dictionary of frames with {' and '.join(_LAYOUT)}; get TACO's own file again")
+    frames = _frames(file)
     rows = np.zeros((len(frames), 51))
-    for row, name in zip(rows, sorted(frames), strict=True):
-        told = {key: plain(file, f"{key} of frame {name}", frames[name][key]) for key in _LAYOUT if key in frames[name]}
+    for row, (name, frame) in zip(rows, frames.items(), strict=True):
+        told = {key: plain(file, f"{key} of frame {name}", frame[key]) for key in _LAYOUT if key in frame}
         row[:] = np.concatenate(list(numbers(f"{file}: frame {name}", told, _LAYOUT, finite=False).values()))
     return rows
 
@@ -122,6 +134,10 @@ def _mesh(path: Path, file: Path) -> Path | None:
 
 def _read_scene(path: Path, contents: Contents, request: Request) -> RecordedScene:
     hands = hands_of(_read, path, contents, request, _present(path))
+    first = {side: min(_frames(path / f"{side}_hand.pkl")) for side in _present(path)}
+    if len(set(first.values())) > 1:
+        told = ", ".join(f"of the {side} hand with {number}" for side, number in first.items())
+        raise InputError(f"{path}: frames begin {told}: these are of two recordings; get the folder again")
     return make_scene(hands, _objects(path, hands[0].num_frames), up=UP, source=_source(path))
 
 

@@ -106,13 +106,13 @@ def test_a_link_of_another_name_finds_the_objects(tmp_path):
         (
             {"right": {}},
             {"side": "right"},
-            r"right_hand\.pkl: not a dictionary of frames with hand_pose and hand_trans",
+            r"right_hand\.pkl: not a dictionary of frames, by number, with hand_pose and hand_trans",
         ),
-        ({"left": {"00001": {"hand_pose": np.zeros(48)}}}, {"side": "left"}, "frame 00001: has no 'hand_trans'"),
+        ({"left": {"00001": {"hand_pose": np.zeros(48)}}}, {"side": "left"}, "frame 1: has no 'hand_trans'"),
         (
             {"right": {"00001": {"hand_pose": np.zeros(51), "hand_trans": np.zeros(3)}}},
             {"side": "right"},
-            r"frame 00001: hand_pose has shape \(51,\), expected \(48\)",
+            r"frame 1: hand_pose has shape \(51,\), expected \(48\)",
         ),
         (
             {"right": {"00001": {"hand_pose": np.full(48, np.nan), "hand_trans": np.zeros(3)}}},
@@ -175,3 +175,15 @@ def test_hands_of_different_lengths_are_told(tmp_path):
     short = dict(list(frames("left").items())[:4])
     with pytest.raises(InputError, match=r"numbers of frames differ \(right hand 6, left hand 4\)"):
         load_scene(write(tmp_path, left=short))
+
+
+def test_frames_that_are_left_out_or_of_another_recording(tmp_path):
+    told = frames("right")
+    names = list(told)
+    folder = write(tmp_path / "one", right={name: told[name] for name in names if name != names[2]})
+    with pytest.raises(InputError, match=r"right_hand\.pkl: 1 of the frames between its first and last are left out"):
+        load_motion(folder, side="right")
+    later = {f"{int(name) + 40:05d}": frame for name, frame in told.items()}
+    folder = write(tmp_path / "two", right=later)
+    with pytest.raises(InputError, match=r"begin of the right hand with 41, of the left hand with 1: these are of two"):
+        load_scene(folder)
