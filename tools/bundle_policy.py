@@ -2,8 +2,8 @@
 
     python -m tools.bundle_policy config=pinch seed=1
 
-writes it, and a held-out demonstration, into train/policies: of those that are lost without a policy the one of median
-tracking error.
+writes it, and a held-out demonstration, into train/policies: of those that it follows and that are lost without a
+policy the one of median tracking error.
 """
 
 import dataclasses
@@ -13,6 +13,7 @@ import numpy as np
 
 from envs.evaluation.evaluate import evaluate_in
 from envs.evaluation.roll_out import make_roll_out, zero_residual
+from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import Demonstration, save_demonstration
 from train.experiment import bundled_policies
 from train.experiment.setup import load_env, rolled_out, settled
@@ -33,10 +34,13 @@ def main(config: Config) -> None:
     env = load_env(config, "heldout")
     checkpoint, _, scores = rolled_out(config, env)
     idle = evaluate_in(env, make_roll_out(env, zero_residual)(None))
-    lost = np.flatnonzero(~idle.scores["manip_trans_object"])
-    lost = lost if len(lost) else np.arange(len(env.demonstrations))
-    errors = scores.scores["tracking_error_cm"][lost]
-    median = int(lost[np.argsort(errors, kind="stable")[len(errors) // 2]])
+    followed = scores.scores["manip_trans_object"] & (np.array(scores.failure) == "")
+    if not followed.any():
+        raise InputError(f"{config.name}: this policy follows no held-out demonstration; train it further")
+    lost = followed & ~idle.scores["manip_trans_object"]
+    shown = np.flatnonzero(lost if lost.any() else followed)
+    errors = scores.scores["tracking_error_cm"][shown]
+    median = int(shown[np.argsort(errors, kind="stable")[len(errors) // 2]])
     for path in include(checkpoint, env.demonstrations[median], config.name):
         print(f"{path}: {path.stat().st_size / 1000:.0f} kB")
 

@@ -13,14 +13,15 @@ from envs.grasps import FIVE
 from mjx_hand.errors import InputError
 from mjx_hand.player.features import OBSERVATION_LIMIT
 from tools import bundle_policy
-from train.experiment.bundled_policies import bundled_env, bundled_policy
-from train.experiment.setup import chosen_checkpoint, settled
+from train.experiment.bundled_policies import bundled_env, bundled_policy, with_policy
+from train.experiment.setup import chosen_checkpoint, load_env, settled
 from train.learning.checkpoint import load_checkpoint
 from train.learning.curve import Point
 from train.learning.policy import deterministic_policy
 from train.play import viewer
 from train.settings.config import Config, compose
 from train.settings.options import Play
+from train.settings.saved import contradiction, policy_settings
 
 Trained = tuple[Path, list[Point]]
 
@@ -35,7 +36,10 @@ def untrained(tiny: Config, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 def test_what_is_included_is_played_where_nothing_was_trained(
     trained: Trained, tiny: Config, untrained: Config, capsys: pytest.CaptureFixture[str]
 ):
-    bundle_policy.main(tiny)
+    with pytest.raises(InputError, match="this policy follows no held-out demonstration; train it further"):
+        bundle_policy.main(tiny)
+    demonstration = load_env(tiny, "heldout").demonstrations[0]
+    bundle_policy.include(load_checkpoint(trained[0] / "best.npz"), demonstration, "tiny")
     capsys.readouterr()
     shown = viewer(untrained)
     shown.close()
@@ -52,6 +56,15 @@ def test_what_is_included_is_played_where_nothing_was_trained(
 def test_without_one_the_command_that_trains_is_named(untrained: Config):
     with pytest.raises(InputError, match=r"no such checkpoint; train one first: python -m train\.ppo"):
         viewer(untrained)
+
+
+@pytest.mark.parametrize("name", [*FIVE, "all"])
+def test_the_policies_that_come_along_are_of_todays_experiments(name: str, tmp_path):
+    """As `train.play config=NAME` has it where nothing is trained, without a word on the command line."""
+    config, included = with_policy(settled(compose([f"config={name}", f"out={tmp_path}"]), {"config", "out"}))
+    assert included
+    told = load_checkpoint(config.checkpoint).settings
+    assert contradiction("the policy", told, policy_settings(config)) == ""
 
 
 @pytest.mark.parametrize(
