@@ -166,8 +166,8 @@ def test_the_sealed_part_is_of_other_people_and_stands_apart(set_path, tmp_path)
 
 
 def test_every_type_draws_its_sealed_part_by_itself():
-    given = [{"seed": 0}, {"seed": 1}, {"sealed_seed": 0}, {"sealed_seed": 2}]
-    settings = [SetSettings(grasp, **one) for grasp in grasp_names() for one in given]
+    seeds = [(0, 1), (1, 1), (0, 0), (0, 2)]
+    settings = [SetSettings(grasp, seed=own, sealed_seed=sealed) for grasp in grasp_names() for own, sealed in seeds]
     assert len({seed_of_sealed(one) for one in settings}) == len(settings)
     assert len({sealed_folder(one, "") for one in settings}) == len(settings)
     assert len({set_folder(one, "") for one in settings}) == 2 * len(grasp_names()), "other parts know nothing of it"
