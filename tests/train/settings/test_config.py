@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from envs.task import Task
 from mjx_hand.errors import InputError
 from train.settings.config import Config, compose, compose_seeds
 
@@ -37,7 +38,8 @@ def test_experiments_change_what_their_file_says_and_the_command_line_wins():
 
 
 def test_without_overrides_the_values_are_those_of_the_dataclasses():
-    assert compose() == Config(out="outputs/pinch/seed0")
+    """Of a pinch, the default experiment, which wraps nothing."""
+    assert compose() == Config(out="outputs/pinch/seed0", task=Task(wrap_torque=0.0))
 
 
 @pytest.mark.parametrize(
