@@ -14,6 +14,7 @@ from envs.demonstrations.set_settings import SetSettings
 from envs.disturbances import Randomize
 from envs.evaluation.roll_out import make_roll_out
 from envs.parallel import ParallelEnv
+from envs.task import Task
 from envs.tracking import TrackingEnv
 from tests.robots.urdfs import urdf_of
 from tests.train.robot_run import robot_run
@@ -45,6 +46,7 @@ def tiny(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureReques
         out=str(tmp_path_factory.mktemp("tiny") / "out"),
         demonstrations=str(shared / "demonstrations"),
         data=SetSettings(grasp="pinch", people=1, heldout_people=1, trials=1, heldout_trials=1),
+        task=Task(wrap_torque=0.0),  # as config=pinch has it, which commands name
         randomize=Randomize(),
         ppo=TINY,
         checks=Checks(every=32),
