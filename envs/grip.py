@@ -17,7 +17,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from mjx_hand.hand.joints import FINGERS, HINGES, LINKS
+from envs.model_grip import SURE, WRAPS
+from mjx_hand.hand.joints import FINGERS, FLEXES, LINKS
 from mjx_hand.objects.primitives import signed_distance
 from mjx_hand.rigid.capsules import capsule_points
 from mjx_hand.rigid.gains import Gains
@@ -26,9 +27,6 @@ from mjx_hand.rigid.rigid_hand import RigidHand
 _NEAR = 0.007  # m: a phalanx whose skin is closer than this is taken to touch
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
 _ALONG = np.linspace(0.0, 1.0, 5)
-# Fingers besides the thumb: with three that touch with two phalanges each a hand wraps, a pinch has two of them.
-_WRAPS, _SURE = 2.5, 0.03
-_FLEXES = np.array([name.endswith("_flexion") for name in HINGES])
 
 
 def grip_offsets(
@@ -97,7 +95,7 @@ def grip_offsets(
         if not wrap_torque:
             return pressing
         around = jnp.sum(jnp.clip(phalanges - 1.0, 0.0, 1.0) * ~thumb)
-        wraps = jax.nn.sigmoid((around - _WRAPS) / _SURE)
-        return (1 - wraps) * pressing + wraps * wrap_torque * limit * _FLEXES / stiffness
+        wraps = jax.nn.sigmoid((around - WRAPS) / SURE)
+        return (1 - wraps) * pressing + wraps * wrap_torque * limit * np.array(FLEXES) / stiffness
 
     return jax.lax.map(lambda row: one(*row), (angles, *object_in_hand), batch_size=64)

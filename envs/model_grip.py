@@ -19,7 +19,9 @@ NEAR = 0.007  # m: a link nearer than this is taken to touch
 _SHARP = 0.001  # m, over which that fades
 _FAR = 0.02  # m, beyond which nobody asks how far
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
-_WRAPS, _SURE = 2.5, 0.03  # as in `envs.grip`; a hand with fewer fingers wraps with all of them
+# Fingers besides those that oppose: with three that touch with two links each a hand wraps, a pinch has two of them. A
+# hand with fewer wraps with all of them.
+WRAPS, SURE = 2.5, 0.03
 _SIDES = 32  # of a cylinder's rim
 _APART = 1e-4  # m that a link is moved out to see which way the surface faces where it just touches
 
@@ -144,24 +146,27 @@ def model_grips(
         model = demonstration_spec(d, body).compile()
         touch, mix = Touch(model, body), coordinates_per_target(model, targets.shape[-1])[:, NUM_WRIST:]
         coordinates = hand_coordinates(model, targets[k])
-        closed = wrap_torque * closing_directions(body) * gains.force_limit / gains.stiffness
+        closed = wrap_torque * closing_directions(body) * gains.force_limit / gains.stiffness if wrap_torque else None
         opposing = np.isin(touch.fingers, body.opposing)
         for t in range(d.num_frames):
             touch.place(coordinates[t], d.object_pose[t])
-            pressed, wraps = _offsets(touch, mix, opposing, float(forces[k]), gains)
-            wraps *= wrap_torque > 0
-            grips[k, t, NUM_WRIST:] = (1 - wraps) * pressed + wraps * closed
+            grips[k, t, NUM_WRIST:] = _offsets(touch, mix, opposing, float(forces[k]), gains, closed)
         grips[k, d.num_frames :] = grips[k, d.num_frames - 1]
     return grips
 
 
 def _offsets(
-    touch: Touch, mix: Float[np.ndarray, "m j"], opposing: np.ndarray, force: float, gains: Gains
-) -> tuple[Float[np.ndarray, "j"], float]:
-    """Offsets (rad) of the actuated joints where hand and object are now, and how surely the hand wraps the object."""
+    touch: Touch,
+    mix: Float[np.ndarray, "m j"],
+    opposing: np.ndarray,
+    force: float,
+    gains: Gains,
+    closed: Float[np.ndarray, "j"] | None,
+) -> Float[np.ndarray, "j"]:
+    """Offsets (rad) of the actuated joints where hand and object are now; `closed` are those of a hand that wraps."""
     found = list(touch.nearest())
     if not found:
-        return np.zeros(mix.shape[1]), 0.0
+        return np.zeros(mix.shape[1])
     numbers = np.array([number for number, *_ in found])
     gaps = np.array([gap for _, gap, *_ in found])
     touching = expit((NEAR - gaps) / _SHARP)
@@ -179,8 +184,10 @@ def _offsets(
     closing = rows * touching[:, None]
     square = closing @ closing.T + _DAMPING**2 * np.eye(len(rows))
     step = closing.T @ np.linalg.solve(square, gaps * touching)
-    others = len({name for name, leads in zip(touch.fingers, opposing, strict=True) if not leads})
-    around = np.clip(phalanges - 1.0, 0.0, 1.0)[~leads].sum()
-    wraps = expit((around - min(_WRAPS, others - 0.5)) / _SURE) if others > 1 else 0.0
     pressed = step + np.clip(torque, -gains.force_limit, gains.force_limit) / gains.stiffness
-    return pressed, float(wraps)
+    others = len(set(np.array(touch.fingers)[~opposing]))
+    if closed is None or others < 2:
+        return pressed
+    around = np.clip(phalanges - 1.0, 0.0, 1.0)[~leads].sum()
+    wraps = expit((around - min(WRAPS, others - 0.5)) / SURE)
+    return (1 - wraps) * pressed + wraps * closed

@@ -119,8 +119,7 @@ def cached_reference(
         return {field.name: np.asarray(getattr(made, field.name)) for field in dataclasses.fields(made)}
 
     bare = [_ingredient(hand) for hand in hands]
-    told = grip_force, wrap_torque, dataclasses.astuple(gains)
-    arrays = cached(compute, list(demonstrations), bare, *told)
+    arrays = cached(compute, list(demonstrations), bare, grip_force, wrap_torque, dataclasses.astuple(gains))
     return Reference(**{name: jnp.asarray(array) for name, array in arrays.items()})
 
 

@@ -39,7 +39,7 @@ def see(model, data, reference: dict, contract: dict, frame: int, residual: np.n
     moved, lookahead = model.actuator_trnid[:, 0], np.array(contract["lookahead"])  # actuated joints: the hand's
     qpos, qvel = data.qpos[model.jnt_qposadr[moved]], data.qvel[model.jnt_dofadr[moved]]
     targets, poses, base = reference["targets"], reference["object_pose"], reference["base"]
-    wrist, thing = data.body("wrist"), data.body("object")
+    wrist, held = data.body("wrist"), data.body("object")
     tips = np.array([data.site(f"{finger}_tip").xpos for finger in contract["body"]["fingers"]])
     place, pose = data.qpos[-7:-4], poses[frame]  # the object's coordinates are the last
     later = np.minimum(frame + lookahead, len(targets) - 1)
@@ -53,7 +53,7 @@ def see(model, data, reference: dict, contract: dict, frame: int, residual: np.n
         base.T @ data.qvel[-6:-3],
         data.qvel[-3:],
         wrist.xmat.reshape(3, 3).T @ (place - wrist.xpos),
-        (tips - place) @ thing.xmat.reshape(3, 3),
+        (tips - place) @ held.xmat.reshape(3, 3),
         targets[later] - targets[frame],
         (poses[later, :3] - pose[:3]) @ base,
         [frame / len(targets), place[2] - poses[0, 2]],

@@ -16,6 +16,7 @@ from envs.evaluation.roll_out import make_roll_out, zero_residual
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import Demonstration, save_demonstration
 from train.experiment import bundled_policies
+from train.experiment.evaluate_seeds import middle
 from train.experiment.setup import load_env, rolled_out, settled
 from train.learning.checkpoint import Checkpoint, save_checkpoint
 from train.settings.config import Config, command
@@ -39,8 +40,7 @@ def main(config: Config) -> None:
         raise InputError(f"{config.name}: this policy follows no held-out demonstration; train it further")
     lost = followed & ~idle.scores["manip_trans_object"]
     shown = np.flatnonzero(lost if lost.any() else followed)
-    errors = scores.scores["tracking_error_cm"][shown]
-    median = int(shown[np.argsort(errors, kind="stable")[len(errors) // 2]])
+    median = int(shown[middle(scores.scores["tracking_error_cm"][shown])])
     for path in include(checkpoint, env.demonstrations[median], config.name):
         print(f"{path}: {path.stat().st_size / 1000:.0f} kB")
 

@@ -131,7 +131,5 @@ def _full(demonstration: Demonstration, env: TrackingEnv, force: float) -> float
     """Newtons of full strength, or None where the demonstration's type wraps; `force` is the reference's own."""
     if demonstration.grasp in grasp_names():
         closing = grasp_type(demonstration.grasp).closing
-        if isinstance(closing, Pads):
-            return closing.force
-        return None
+        return closing.force if isinstance(closing, Pads) else None
     return _UNKNOWN_FULL * force

@@ -1,6 +1,7 @@
 """Rows of an Apache Parquet table, by `pyarrow`, which the extra `parquet` installs.
 
-A table may be far larger than memory: a row is read by itself, and of it only the columns that are asked for.
+A table may be far larger than memory: of the columns that are asked for one row is held at a time. What stands before
+it in its group is decoded on the way.
 """
 
 import importlib.util

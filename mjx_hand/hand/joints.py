@@ -27,6 +27,7 @@ HINGES = tuple(
     )
 )
 NUM_HINGES = len(HINGES)  # 20
+FLEXES = tuple(name.endswith("_flexion") for name in HINGES)  # which of them flex; the others spread
 # The link that each hinge moves: two hinges move the finger's first link, one each of the others.
 HINGE_LINKS = tuple(1 + 3 * f + k for f in range(5) for k in (0, 0, 1, 2))
 

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
 
 from envs.evaluation.constant_press import constant_press, search_press
 from envs.evaluation.evaluate import Evaluation, evaluate_in
@@ -119,8 +120,13 @@ def median_and_worst(evaluations: Mapping[int, Evaluation]) -> dict[str, tuple[i
     places = [(seed, k) for seed, e in evaluations.items() for k in range(len(e.demonstration))]
     errors = np.concatenate([e.scores["tracking_error_cm"] for e in evaluations.values()])
     failed = np.array([bool(reason) for e in evaluations.values() for reason in e.failure])
-    median = np.argsort(errors, kind="stable")[len(errors) // 2]
+    median = middle(errors)
     return {"median": places[median], "worst": places[np.lexsort((errors, failed))[-1]]}
+
+
+def middle(values: Float[np.ndarray, "n"]) -> int:
+    """Where the median stands, of an even number the greater of two."""
+    return int(np.argsort(values, kind="stable")[len(values) // 2])
 
 
 def shared_folder(configs: Sequence[Config]) -> Path:

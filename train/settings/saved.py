@@ -67,7 +67,7 @@ def policy_settings(config: Config) -> Settings:
 
 def differing(before: Settings, now: Settings) -> list[str]:
     """The options that differ. One that there was not yet when `before` was written had `_BEFORE`, or its default."""
-    usual = {option: value for option, value in {**settings_of(Config()), **_BEFORE}.items() if option in now}
+    usual = {option: value for option, value in _unsaid().items() if option in now}
     was = _renamed(before)
     if not any(_is(option, _RECORDING) for option in now):
         was = {option: value for option, value in was.items() if not _is(option, _RECORDING)}
@@ -75,13 +75,18 @@ def differing(before: Settings, now: Settings) -> list[str]:
     return [option for option in sorted(known.keys() | now.keys()) if known.get(option) != now.get(option)]
 
 
+def _unsaid() -> Settings:
+    """What a run's settings stand for where they do not name an option."""
+    return {**settings_of(Config()), **_BEFORE}
+
+
 def contradiction(what: str, before: Settings, now: Settings) -> str:
     """How settings differ from those of a training that `what` names, in one sentence; empty where they do not."""
     options = differing(before, now)
     if not options:
         return ""
-    usual, others = {**settings_of(Config()), **_BEFORE}, f" and {len(options) - 1} more" if len(options) > 1 else ""
-    was = _renamed(before).get(options[0], usual.get(options[0]))
+    others = f" and {len(options) - 1} more" if len(options) > 1 else ""
+    was = _renamed(before).get(options[0], _unsaid().get(options[0]))
     return f"{what} holds a training with {options[0]}={was}, now {now.get(options[0])}{others}"
 
 

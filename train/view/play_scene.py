@@ -37,11 +37,11 @@ def rollout_scene(
         title: one line.
     """
     frames = np.flatnonzero(rollouts.counted[index])
-    thing, *support = object_layers(recorded, rollouts.object_pose[index, frames])
+    achieved, *support = object_layers(recorded, rollouts.object_pose[index, frames])
     wanted, *_ = object_layers(recorded, rollouts.object_reference[index, frames])
     layers = (
         *_hands(env, rollouts, index, _first(recorded.motion, len(frames)), person),
-        thing,
+        achieved,
         ghost(replace(wanted, name="demonstrated object")),
         *support,
         force_layer(rollouts, index),

@@ -7,6 +7,7 @@ what its flexing joints can. Here contacts and derivatives are the C engine's, a
 """
 
 from collections import Counter
+from collections.abc import Mapping
 
 import mujoco
 import numpy as np
@@ -14,7 +15,7 @@ from jaxtyping import Float
 
 from envs.grip_force import grip_force_of
 from envs.scene import NUM_WRIST
-from mjx_hand.hand.joints import FINGERS, HINGES, LINKS, NUM_HINGES
+from mjx_hand.hand.joints import FINGERS, FLEXES, LINKS, NUM_HINGES
 from mjx_hand.rigid.gains import Gains
 
 NEAR = 0.008  # m: a phalanx that is closer to the object is taken to touch
@@ -26,7 +27,6 @@ _SOON = 0.15  # s over which a grip is taken up and let go: a finger that comes 
 _WRAP_TORQUE = 0.75  # of their torque limits, with which flexing joints close around an object
 # Fingers besides the thumb that are near with two phalanges where a hand begins to wrap, and phalanges when it ends.
 _WRAPS, _LETS_GO = 3, 2
-_FLEXES = np.array([name.endswith("_flexion") for name in HINGES])
 _THUMB = FINGERS.index("thumb")
 _HINGES = slice(NUM_WRIST, NUM_WRIST + NUM_HINGES)
 
@@ -80,34 +80,43 @@ class Grip:
 
     def _pressed(self, data: mujoco.MjData, seconds: float) -> Float[np.ndarray, "20"]:
         """What to add to the hinges' targets (rad)."""
-        torque, rows, gaps = np.zeros(NUM_HINGES), [], []
         nearest = self._nearest(data)
-        fingers = {(link - 1) // 3 for link in nearest if link > 0}
-        others = len(fingers - {_THUMB})
+        phalanges = Counter((link - 1) // 3 for link in nearest if link > 0)
+        others = [count for finger, count in phalanges.items() if finger != _THUMB]
+        # What slips touches less: a grip that weakened with it would let go.
+        around = sum(count > 1 for count in others)
+        self._wraps = sum(others) > _LETS_GO if self._wraps else around >= _WRAPS
+        self._holds = self._wraps or (bool(others) and _THUMB in phalanges)
+        if self._wraps:
+            wanted = _WRAP_TORQUE * np.array(FLEXES) * self._gains.force_limit / self._gains.stiffness
+        elif others:
+            wanted = self._press(data, nearest, phalanges)
+        else:  # a thumb alone presses nothing
+            wanted = np.zeros(NUM_HINGES)
+        self._offsets += min(1.0, seconds / _SOON) * (wanted - self._offsets)
+        return self._offsets
+
+    def _press(
+        self,
+        data: mujoco.MjData,
+        nearest: dict[int, tuple[float, np.ndarray, np.ndarray]],
+        phalanges: Mapping[int, int],
+    ) -> Float[np.ndarray, "20"]:
+        """Offsets (rad) that press with what is near: J^T f / kp, and a damped least-squares step that closes gaps."""
+        torque, rows, gaps = np.zeros(NUM_HINGES), [], []
+        others = len(phalanges.keys() - {_THUMB})
         for link, (gap, place, inward) in nearest.items():
-            if link == 0 or not others:  # the palm is pressed against; a thumb alone presses nothing
+            if link == 0:  # the palm is pressed against
                 continue
             finger = (link - 1) // 3
-            phalanges = sum((other - 1) // 3 == finger for other in nearest if other > 0)
             share = 1.0 if finger == _THUMB else 1.0 / others
             mujoco.mj_jac(self._model, data, self._jacobian, None, place, self._model.body(LINKS[link]).id)
             rows.append(inward @ self._jacobian[:, _HINGES])
             gaps.append(max(gap, 0.0))
-            torque += self._force * share / phalanges * rows[-1]
-        limit = self._gains.force_limit
-        wanted = np.clip(torque, -limit, limit) / self._gains.stiffness
-        if rows:  # and a damped least-squares step that closes the gaps
-            lever = np.stack(rows)
-            wanted += lever.T @ np.linalg.solve(lever @ lever.T + _DAMPING**2 * np.eye(len(rows)), np.array(gaps))
-        near = Counter((link - 1) // 3 for link in nearest if link > 0 and (link - 1) // 3 != _THUMB)
-        around = sum(count > 1 for count in near.values())
-        # What slips touches less: a grip that weakened with it would let go.
-        self._wraps = near.total() > _LETS_GO if self._wraps else around >= _WRAPS
-        self._holds = self._wraps or (others > 0 and _THUMB in fingers)
-        if self._wraps:
-            wanted = _WRAP_TORQUE * _FLEXES * limit / self._gains.stiffness
-        self._offsets += min(1.0, seconds / _SOON) * (wanted - self._offsets)
-        return self._offsets
+            torque += self._force * share / phalanges[finger] * rows[-1]
+        limit, lever = self._gains.force_limit, np.stack(rows)
+        step = lever.T @ np.linalg.solve(lever @ lever.T + _DAMPING**2 * np.eye(len(rows)), np.array(gaps))
+        return np.clip(torque, -limit, limit) / self._gains.stiffness + step
 
     def _nearest(self, data: mujoco.MjData) -> dict[int, tuple[float, np.ndarray, np.ndarray]]:
         """Of each link that is near the object: the gap (m), its nearest place (m), the way into the object there."""

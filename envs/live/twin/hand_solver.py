@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float
 
 from mjx_hand.capture.keypoints.layouts import LINK_KEYPOINTS, NUM_KEYPOINTS, PALM, TIP_KEYPOINTS
 from mjx_hand.capture.pose.wrist import rigid_fit
-from mjx_hand.hand.joints import FINGERS, HINGES, LINKS, NUM_HINGES, TIP_LINKS
+from mjx_hand.hand.joints import FINGERS, FLEXES, LINKS, NUM_HINGES, TIP_LINKS
 from mjx_hand.rigid.export.mjcf import hand_spec
 from mjx_hand.rigid.rigid_hand import RigidHand
 
@@ -49,7 +49,7 @@ class HandSolver:
         self._links = np.array(bodies)
         self._tips = np.array([self._model.site(f"{finger}_tip").id for finger in FINGERS])
         self._order = order
-        self._flexion = np.array([not name.endswith("abduction") for name in HINGES])
+        self._flexion = np.array(FLEXES)
         self._jacobian = np.zeros((NUM_KEYPOINTS, 3, _DOFS))
         self._rest = self._points(self._model.qpos0)
         self._qpos = self._model.qpos0.copy()

@@ -26,6 +26,7 @@ its list of columns: a table without `hands` is refused with the names of those 
 (`sequence_info`), whose rotations are explained nowhere. Video is not read.
 """
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -231,9 +232,7 @@ def _mesh(path: Path, name: str) -> Path | None:
 
 def _read_scene(path: Path, contents: Contents, request: Request) -> RecordedScene:
     name, row = _trajectory(path, contents, request)
-    hands = hands_of(
-        lambda path, row, asked: _hand(name, path, row, asked), path, row, request, list(_hands(path, row, request))
-    )
+    hands = hands_of(partial(_hand, name), path, row, request, list(_hands(path, row, request)))
     return make_scene(hands, _objects(path, row), up=UP, source=f"DexCanvas {name}")
 
 

@@ -41,8 +41,12 @@ _LAYOUT = {"hand_pose": (48,), "hand_trans": (3,)}
 _MODELS = ("Object_Models", "object_models_released")
 
 
+def _file(path: Path, side: str) -> Path:
+    return path / f"{side}_hand.pkl"
+
+
 def _present(path: Path) -> list[str]:
-    return [side for side in ("right", "left") if (path / f"{side}_hand.pkl").is_file()]
+    return [side for side in ("right", "left") if _file(path, side).is_file()]
 
 
 def _recognises(path: Path, contents: Contents) -> bool:
@@ -63,9 +67,8 @@ def _frames(file: Path) -> dict[int, dict[str, Any]]:
     return dict(sorted(numbered.items()))
 
 
-def _rows(file: Path) -> Float[np.ndarray, "t 51"]:
+def _rows(file: Path, frames: dict[int, dict[str, Any]]) -> Float[np.ndarray, "t 51"]:
     """Pose and translation of each frame."""
-    frames = _frames(file)
     rows = np.zeros((len(frames), 51))
     for row, (name, frame) in zip(rows, frames.items(), strict=True):
         told = {key: plain(file, f"{key} of frame {name}", frame[key]) for key in _LAYOUT if key in frame}
@@ -83,8 +86,14 @@ def _shape(file: Path) -> Float[np.ndarray, "10"]:
 
 def _read(path: Path, contents: Contents, request: Request) -> Motion:
     side = chosen_side(path, _present(path), request)
-    rows = _rows(path / f"{side}_hand.pkl")
-    valid = recorded(path / f"{side}_hand.pkl", rows)
+    return _hand(path, {side: _frames(_file(path, side))}, request)
+
+
+def _hand(path: Path, frames: Contents, request: Request) -> Motion:
+    """The hand that the request names, of those whose frames are given by side."""
+    side = chosen_side(path, list(frames), request)
+    rows = _rows(_file(path, side), frames[side])
+    valid = recorded(_file(path, side), rows)
     rotations = turns(rows[:, :48].reshape(-1, 16, 3), valid)
     return mano_motion(
         path,
@@ -133,11 +142,12 @@ def _mesh(path: Path, file: Path) -> Path | None:
 
 
 def _read_scene(path: Path, contents: Contents, request: Request) -> RecordedScene:
-    hands = hands_of(_read, path, contents, request, _present(path))
-    first = {side: min(_frames(path / f"{side}_hand.pkl")) for side in _present(path)}
+    frames = {side: _frames(_file(path, side)) for side in _present(path)}
+    first = {side: min(own) for side, own in frames.items()}
     if len(set(first.values())) > 1:
         told = ", ".join(f"of the {side} hand with {number}" for side, number in first.items())
         raise InputError(f"{path}: frames begin {told}: these are of two recordings; get the folder again")
+    hands = hands_of(_hand, path, frames, request, list(frames))
     return make_scene(hands, _objects(path, hands[0].num_frames), up=UP, source=_source(path))
 
 

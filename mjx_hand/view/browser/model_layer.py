@@ -2,6 +2,7 @@
 
 import mujoco
 import numpy as np
+import trimesh
 from jaxtyping import Float
 
 from mjx_hand.objects.description import ObjectDescription
@@ -54,13 +55,7 @@ def _surfaces(model: mujoco.MjModel) -> dict[int, Mesh]:
         body = int(model.geom_bodyid[geom])
         if hand[body]:
             pieces.setdefault(body, []).append(_surface(model, int(geom)))
-    return {body: _joined(own) for body, own in sorted(pieces.items())}
-
-
-def _joined(pieces: list[Mesh]) -> Mesh:
-    first = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])[:-1]
-    faces = [faces + start for (_, faces), start in zip(pieces, first, strict=True)]
-    return np.concatenate([vertices for vertices, _ in pieces]), np.concatenate(faces)
+    return {body: trimesh.util.append_faces(*zip(*own, strict=True)) for body, own in sorted(pieces.items())}
 
 
 def _surface(model: mujoco.MjModel, geom: int) -> Mesh:
