@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from envs.approach import followed_target
+from envs.commands import followed_target
 from envs.physics.engine import PhysicsState
 from envs.reference import Reference
 from envs.scene import NUM_WRIST
@@ -14,14 +14,13 @@ from mjx_hand.bodies.body import Body
 from mjx_hand.objects.description import OBJECT_KINDS
 from mjx_hand.player.features import (
     CONTACT_FORCES,
-    HUMAN_NAMES,
+    LIVE_ONLY,
     OBSERVATION_LIMIT,
     Feature,
-    HandNames,
-    ObservedState,
     feature_table,
     offsets_and_scales,
 )
+from mjx_hand.player.observed_state import HUMAN_NAMES, HandNames, ObservedState
 from mjx_hand.rotations import axis_angle_matrix, quaternion_difference, quaternion_to_matrix
 
 _PROPERTIES = ("object_mass", "object_friction")  # what no camera sees
@@ -37,8 +36,8 @@ def residual_scale(task: Task, hand: HandNames = HUMAN_NAMES, reach: float = 1.0
     """What a residual of 1 is worth for each target (m, rad), of a hand with this `Body.reach`."""
     return np.concatenate(
         [
-            np.full(3, task.residual_scale_wrist_position),
-            np.full(3, task.residual_scale_wrist_rotation),
+            np.full(3, 0.0 if task.live else task.residual_scale_wrist_position),
+            np.full(3, 0.0 if task.live else task.residual_scale_wrist_rotation),
             np.full(len(hand.joints), reach * task.residual_scale_fingers),
         ]
     )
@@ -49,6 +48,7 @@ def observed_features(task: Task, hand: HandNames = HUMAN_NAMES, reach: float = 
     table = feature_table(residual_scale(task, hand, reach), task.lookahead, OBJECT_KINDS, hand)
     unseen = {name for name in _PROPERTIES if not task.observe_properties}
     unseen |= {CONTACT_FORCES} if not task.observe_forces else set()
+    unseen |= {f.name for f in table if f.of_demonstration} if task.live else LIVE_ONLY
     return tuple(feature for feature in table if feature.name not in unseen)
 
 
@@ -61,9 +61,11 @@ def observe(
     physics: PhysicsState,
     residual: Float[Array, "u"],
     displacement: Float[Array, "3"] | None = None,
+    commanded: Float[Array, "u"] | None = None,
 ) -> Float[Array, "o"]:
-    """The observation at `frame` of a demonstration; `displacement` is where the wrist's path goes with the object."""
-    seen = _seen(reference, task, body, demonstration, frame, physics, residual, displacement)
+    """The observation at `frame` of a demonstration; `displacement` is where the wrist's path goes with the object, and
+    `commanded` what a teleoperated hand was told, which it sees in place of the demonstrated coordinates."""
+    seen = _seen(reference, task, body, demonstration, frame, physics, residual, displacement, commanded)
     table = observed_features(task, body.names, body.reach)
     offset, scale = offsets_and_scales(table)
     features = jnp.concatenate([feature.value(seen).ravel() for feature in table])
@@ -79,12 +81,14 @@ def _seen(
     physics: PhysicsState,
     residual: Float[Array, "u"],
     displacement: Float[Array, "3"] | None,
+    commanded: Float[Array, "u"] | None,
 ) -> ObservedState:
     base, length = reference.base[demonstration], reference.length[demonstration]
     poses = reference.object_pose[demonstration]
     later = jnp.minimum(frame + jnp.array(task.lookahead), length - 1)
     frames = jnp.concatenate([frame[None], later])
     targets = reference.targets[demonstration, frames]
+    targets = targets if commanded is None else targets.at[0].set(commanded)
     if displacement is not None:
         targets = targets + jax.vmap(lambda k: followed_target(reference, demonstration, k, displacement))(frames)
     hand, first = body.of_targets(physics.qpos), body.num_coordinates

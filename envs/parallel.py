@@ -5,6 +5,7 @@ import jax.numpy as jnp
 from brax.envs.base import Env, State
 from jaxtyping import Array, Float, Int
 
+from envs.commands import EXPERT
 from envs.tracking import TrackingEnv
 from envs.twin import Tables, Twin, twin_of
 from mjx_hand.pytree import pytree
@@ -81,7 +82,7 @@ class ParallelEnv(Env):
         return state.replace(info=info)  # type: ignore[attr-defined]
 
     def _step(self, state: State, action: Float[Array, "u"]) -> State:
-        ours = {name: state.info[name] for name in ("truncation", "progress")}
+        ours = {name: state.info[name] for name in ("truncation", "progress", EXPERT) if name in state.info}
         stepped = self.env.step(state.replace(info=ours), action)  # type: ignore[attr-defined]
         now, later = jax.random.split(state.info["rng"])
         fresh = self.env.reset(now)

@@ -10,7 +10,7 @@ from jaxtyping import Array, Float, Int
 from scipy.spatial.transform import Rotation
 
 from envs.grip_table import grip_forces, grip_table, padded, people_of
-from envs.scene import base_rotation, wrist_coordinates
+from envs.scene import NUM_WRIST, base_rotation, wrist_coordinates
 from mjx_hand.bodies.body import Body
 from mjx_hand.bodies.body_places import body_model, model_places
 from mjx_hand.bodies.coordinates import hand_coordinates
@@ -18,7 +18,7 @@ from mjx_hand.bodies.human_body import body_of
 from mjx_hand.errors import InputError
 from mjx_hand.files.array_cache import cached, model_bytes
 from mjx_hand.motion.demonstration import Demonstration
-from mjx_hand.objects.description import OBJECT_KINDS
+from mjx_hand.objects.description import object_features
 from mjx_hand.player.approach import approach_weights
 from mjx_hand.pytree import pytree
 from mjx_hand.rigid.gains import Gains
@@ -31,8 +31,11 @@ class Reference:
 
     Attributes:
         targets: the wrist's slides and turns, and the values of actuated joints, as demonstrated.
-        controls: what to command so that the controllers are at each target when its frame comes, and press.
-        grip: the share of the controls that presses the fingers on the object.
+        controls: what to command so that the controllers are at each target when its frame comes, and press; of a
+            teleoperated hand what its tracker says.
+        grip: the share of the controls that presses the fingers on the object; of a teleoperated hand nothing.
+        lacking: what the joints' controls of a teleoperated hand lack of those of the same demonstration without
+            teleoperation, its press included; None of other hands.
         tips: finger tips in the world, as demonstrated, in the order of the hand's fingers.
         object_pose: in the world.
         approach: how far the wrist's path goes with an object that is seen elsewhere (`mjx_hand.player.approach`).
@@ -50,6 +53,7 @@ class Reference:
     base: Float[Array, "d 3 3"]
     features: Float[Array, "d f"]
     length: Int[Array, "d"]
+    lacking: Float[Array, "d t u"] | None = None
 
 
 def make_reference(
@@ -59,6 +63,7 @@ def make_reference(
     grip_force: float | None,
     wrap_torque: float = 0.0,
     gains: Gains,
+    live: bool = False,
 ) -> Reference:
     """Stack demonstrations and work out their controls.
 
@@ -69,9 +74,11 @@ def make_reference(
             of a recorded object asks for.
         wrap_torque: share of the torque limits with which hands that wrap close (`envs.grip.grip_offsets`).
         gains: of the hand's position controllers.
+        live: whether the hands are teleoperated (`Task.live`).
 
     Raises:
-        InputError: none given, several rates or sides, or no force for a demonstration whose grasp is no type.
+        InputError: none given, several rates or sides, no force for a demonstration whose grasp is no type, or a
+            teleoperated hand that no tracker saw.
     """
     _check(demonstrations)
     forces = grip_forces(demonstrations, grip_force)
@@ -84,17 +91,23 @@ def make_reference(
         approach.append(padded(approach_weights(np.asarray(d.object_pose), d.motion.fps), frames))
     targets = jnp.asarray(np.stack(targets), jnp.float32)
     grip = grip_table(demonstrations, hands, targets, np.where(forces > 0, forces, np.nan), gains, wrap_torque)
-    features = [[*d.object.size, d.object.mass, d.object.friction, *_one_of_kinds(d)] for d in demonstrations]
+    controls = anticipated(targets, gains, demonstrations[0].motion.fps) + grip
+    lacking = None
+    if live:
+        tracked = jnp.asarray(np.stack([padded(_tracked(d), frames) for d in demonstrations]), jnp.float32)
+        lacking = (controls - tracked).at[:, :, :NUM_WRIST].set(0.0)
+        controls, grip = tracked, jnp.zeros_like(grip)
     return Reference(
         targets=targets,
-        controls=anticipated(targets, gains, demonstrations[0].motion.fps) + grip,
+        controls=controls,
         grip=grip,
         tips=jnp.asarray(_tips(demonstrations, hands, targets), jnp.float32),
         object_pose=jnp.asarray(np.stack(poses), jnp.float32),
         approach=jnp.asarray(np.stack(approach), jnp.float32),
         base=jnp.asarray(np.stack(bases), jnp.float32),
-        features=jnp.asarray(features, jnp.float32),
+        features=jnp.asarray(np.stack([object_features(d.object) for d in demonstrations]), jnp.float32),
         length=jnp.array([d.num_frames for d in demonstrations]),
+        lacking=lacking,
     )
 
 
@@ -105,21 +118,36 @@ def demonstrated_targets(demonstration: Demonstration) -> Float[np.ndarray, "t u
     return np.concatenate([wrist, motion.angles], axis=1)
 
 
+def _tracked(demonstration: Demonstration) -> Float[np.ndarray, "t u"]:
+    """As `demonstrated_targets`, where a live tracker had the hand."""
+    if demonstration.tracked is None:
+        raise InputError(
+            "task.live is true, and a demonstration has no tracked hand; make the set with data.streamed=true, or "
+            "leave task.live out"
+        )
+    place, quaternion, angles = np.split(np.asarray(demonstration.tracked), [3, 7], axis=1)
+    return np.concatenate([wrist_coordinates(place, quaternion, base_rotation(demonstration)), angles], axis=1)
+
+
 def cached_reference(
     demonstrations: Sequence[Demonstration],
     hands: Sequence[RigidHand | Body],
     grip_force: float | None,
     wrap_torque: float,
     gains: Gains,
+    live: bool = False,
 ) -> Reference:
     """`make_reference`, kept on disk."""
 
     def compute() -> dict[str, np.ndarray]:
-        made = make_reference(demonstrations, hands, grip_force=grip_force, wrap_torque=wrap_torque, gains=gains)
-        return {field.name: np.asarray(getattr(made, field.name)) for field in dataclasses.fields(made)}
+        made = make_reference(
+            demonstrations, hands, grip_force=grip_force, wrap_torque=wrap_torque, gains=gains, live=live
+        )
+        fields = {field.name: getattr(made, field.name) for field in dataclasses.fields(made)}
+        return {name: np.asarray(value) for name, value in fields.items() if value is not None}
 
     bare = [_ingredient(hand) for hand in hands]
-    arrays = cached(compute, list(demonstrations), bare, grip_force, wrap_torque, dataclasses.astuple(gains))
+    arrays = cached(compute, list(demonstrations), bare, grip_force, wrap_torque, dataclasses.astuple(gains), live)
     return Reference(**{name: jnp.asarray(array) for name, array in arrays.items()})
 
 
@@ -160,10 +188,6 @@ def _ingredient(hand: RigidHand | Body) -> object:
     """What a hand's part of the reference follows from."""
     rigid = body_of(hand).rigid
     return model_bytes(body_model(body_of(hand))) if rigid is None else without_meshes(rigid)
-
-
-def _one_of_kinds(demonstration: Demonstration) -> list[float]:
-    return [float(demonstration.object.kind == kind) for kind in OBJECT_KINDS]
 
 
 def _check(demonstrations: Sequence[Demonstration]) -> None:

@@ -17,8 +17,11 @@ from envs.physics.solver import gauss_seidel
 from envs.reference import Reference
 from envs.scene import OBJECT
 from mjx_hand.bodies.coordinates import hand_coordinates
+from mjx_hand.files.array_cache import cached, model_bytes
+from mjx_hand.pytree import replace
 
 _HEAVIER = 300.0
+_STATE = ("qpos", "qvel", "ctrl")
 
 
 def assisted_replay(
@@ -56,6 +59,22 @@ def assisted_replay(
         now[:, hand:], moving[:, hand:] = pose[:, t], speed[:, t]
         qpos[:, t], qvel[:, t] = now, moving
     return qpos, qvel, controls
+
+
+def cached_replay(
+    models: Sequence[mujoco.MjModel], reference: Reference, substeps: int
+) -> tuple[Float[np.ndarray, "d t nq"], Float[np.ndarray, "d t nv"], Float[np.ndarray, "d t nu"]]:
+    """`assisted_replay` in single precision, kept on disk; of teleoperated hands with the press that they lack."""
+    if reference.lacking is not None:
+        reference = replace(reference, controls=reference.controls + reference.lacking)
+
+    def compute() -> dict[str, np.ndarray]:
+        states = assisted_replay(models, reference, substeps)
+        return {name: np.asarray(a, np.float32) for name, a in zip(_STATE, states, strict=True)}
+
+    replayed = cached(compute, *(model_bytes(m) for m in models), reference, substeps)
+    qpos, qvel, ctrl = (replayed[name] for name in _STATE)
+    return qpos, qvel, ctrl
 
 
 def with_heavy_object(model: mujoco.MjModel) -> mujoco.MjModel:

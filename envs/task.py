@@ -44,6 +44,10 @@ class Task:
             ("self"), or "all".
         observe_forces: whether the policy sees what each link presses the object with, as a tactile skin does.
         observe_properties: whether the policy sees the object's mass and friction, which no camera does.
+        live: whether a person teleoperates the hand as it happens: what a tracker says (`data.streamed`) is commanded,
+            without the controllers' lead and without a press, the policy moves the joints alone, not the wrist, and
+            sees nothing of where the demonstration takes hand and object. Episodes that start in the middle start with
+            the residual that presses.
     """
 
     substeps: int = 5
@@ -67,6 +71,7 @@ class Task:
     contacts: str = "all"
     observe_forces: bool = False
     observe_properties: bool = False
+    live: bool = False
 
     def __post_init__(self):
         positive = (

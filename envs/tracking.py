@@ -14,8 +14,8 @@ import numpy as np
 from brax.envs.base import Env, State
 from jaxtyping import Array, Float, Int
 
-from envs.approach import followed_target
 from envs.assistance import assistance
+from envs.commands import expert_action, first_residual_and_command, followed_target, next_command
 from envs.disturbances.episode import delayed, pushing, seen_pose
 from envs.disturbances.randomize import Randomize
 from envs.disturbances.tables import disturbance_tables, disturbed_start
@@ -25,7 +25,7 @@ from envs.observation import observe, residual_scale
 from envs.physics import make_engine
 from envs.physics.engine import PhysicsState
 from envs.reference import Reference, cached_reference
-from envs.replay import assisted_replay
+from envs.replay import cached_replay
 from envs.rewards import TrackedStep, metric_names, weighted_terms
 from envs.scene import NUM_WRIST, OBJECT, demonstration_models
 from envs.task import Task, check_rate
@@ -33,8 +33,8 @@ from envs.twin import Tables, Twin, twin_of
 from envs.varied_scene import varied_models
 from mjx_hand.bodies.body import Body
 from mjx_hand.bodies.human_body import check_one_kind
-from mjx_hand.files.array_cache import cached, model_bytes
 from mjx_hand.motion.demonstration import Demonstration
+from mjx_hand.player.features import reciprocal
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand
 from mjx_hand.rotations import quaternion_difference
@@ -78,13 +78,13 @@ class TrackingEnv(Env):
         randomize: Randomize | None = None,
     ):
         self.demonstrations, self.hands = tuple(demonstrations), tuple(hands)
-        self.task = Task() if task is None else task
+        self.task = task = Task() if task is None else task
         self.body = check_one_kind(hands)
+        self._scale = residual_scale(task, self.body.names, self.body.reach)
         self.gains = gains = self.body.gains if gains is None else gains
-        reference = cached_reference(demonstrations, hands, self.task.grip_force, self.task.wrap_torque, gains)
-        self.assisted = self.task.assist > 0
-        self.randomize = randomize
-        motors, contacts = self.assisted or randomize is not None, self.task.contacts
+        reference = cached_reference(demonstrations, hands, task.grip_force, task.wrap_torque, gains, task.live)
+        self.assisted, self.randomize = task.assist > 0, randomize
+        motors, contacts = self.assisted or randomize is not None, task.contacts
         self.models = demonstration_models(demonstrations, hands, gains=gains, assisted=motors, contacts=contacts)
         self.variations = draw_variations(randomize or Randomize.only(), len(self.demonstrations), _VARIATION_SEED)
         scenes = self.models
@@ -167,17 +167,19 @@ class TrackingEnv(Env):
             key = jax.random.fold_in(jax.random.key(0), demonstration) if rng is None else rng
             told = tables, self.reference.controls, self.reference.object_pose, self.task.follow_object
             frame, physics, episode = disturbed_start(*told, demonstration, frame, physics, key)
+        residual, commanded = first_residual_and_command(self.reference, demonstration, frame, self._scale)
         twin = Twin(
             physics=physics,
             demonstration=demonstration,
             frame=frame,
-            residual=jnp.zeros(self.action_size),
+            residual=residual,
             episode=episode,
+            commanded=commanded,
         )
-        zero = jnp.zeros(())
+        zero, expert = jnp.zeros(()), expert_action(self.reference, demonstration, frame, commanded, self._scale)
         names = (*metric_names(self.task.rewards), "error/position", "error/rotation", "unstable")
         metrics = dict.fromkeys(names, zero)
-        info = {"truncation": zero, "progress": jnp.ones(())}
+        info = {"truncation": zero, "progress": jnp.ones(()), **expert}
         return State(twin, self._observe(twin), zero, zero, metrics, info)  # type: ignore[call-arg]
 
     def step(self, state: State, action: Float[Array, "u"]) -> State:
@@ -190,6 +192,7 @@ class TrackingEnv(Env):
         task, progress = self.task, state.info["progress"]
         action = jnp.clip(action, -1.0, 1.0)
         frame, residual, targets = self.command(twin, action)
+        commanded = None if twin.commanded is None else next_command(self.reference, twin, frame, self.dt)
         episode, tables, force = twin.episode, self.tables.disturbances, None
         if self.assisted:
             force = self._assistance(twin, frame, progress)
@@ -199,14 +202,17 @@ class TrackingEnv(Env):
             force = push if force is None else force + push
         physics = self.engine.step(twin.physics, targets if force is None else jnp.concatenate([targets, force]))
         before = twin.residual
-        twin = Twin(physics=physics, demonstration=twin.demonstration, frame=frame, residual=residual, episode=episode)
+        twin = dataclasses.replace(
+            twin, physics=physics, frame=frame, residual=residual, episode=episode, commanded=commanded
+        )
 
         position, rotation = self._errors(twin)
         terms = weighted_terms(task.rewards, self._tracked(twin, position, rotation, action, residual - before))
         done = jnp.maximum(task.lost(position, rotation, progress).astype(jnp.float32), physics.unstable)
         finished = (frame >= self.reference.length[twin.demonstration] - 1).astype(jnp.float32)
         metrics = {**terms, "error/position": position, "error/rotation": rotation, "unstable": physics.unstable}
-        info = {**state.info, "truncation": finished * (1 - done)}
+        expert = expert_action(self.reference, twin.demonstration, frame, commanded, self._scale)
+        info = {**state.info, "truncation": finished * (1 - done), **expert}
         return state.replace(  # type: ignore[attr-defined]
             pipeline_state=twin,
             obs=self._observe(twin),
@@ -221,10 +227,9 @@ class TrackingEnv(Env):
     ) -> tuple[Int[Array, ""], Float[Array, "u"], Float[Array, "u"]]:
         """The next frame, the residual there, and what the actuators are told on the way (m, rad)."""
         task = self.task
-        scale = residual_scale(task, self.body.names, self.body.reach)
-        residual = task.smoothing * twin.residual + (1 - task.smoothing) * scale * action
+        residual = task.smoothing * twin.residual + (1 - task.smoothing) * self._scale * action
         frame = jnp.minimum(twin.frame + 1, self.reference.length[twin.demonstration] - 1)
-        target = self.reference.controls[twin.demonstration, frame] + residual
+        target = next_command(self.reference, twin, frame, self.dt) + residual
         if twin.episode is not None:
             target = target + followed_target(self.reference, twin.demonstration, frame, twin.episode.displacement)
         return frame, residual, jnp.clip(target, self.tables.low, self.tables.high)
@@ -249,7 +254,7 @@ class TrackingEnv(Env):
             seen = seen_pose(twin.episode, tables.episode, twin.frame, physics.qpos[n:])
             physics = dataclasses.replace(physics, qpos=jnp.concatenate([physics.qpos[:n], seen]))
         told = self.reference, self.task, self.body, twin.demonstration, twin.frame, physics, twin.residual
-        return observe(*told, twin.episode and twin.episode.displacement)
+        return observe(*told, twin.episode and twin.episode.displacement, twin.commanded)
 
     def _tracked(self, twin: Twin, position: Array, rotation: Array, action: Array, moved: Array) -> TrackedStep:
         """What the reward is counted from; `moved` is how far the residual went in this step."""
@@ -264,7 +269,7 @@ class TrackingEnv(Env):
             tips=twin.physics.sensordata.reshape(-1, 3),
             tips_reference=self.reference.tips[place],
             action=action,
-            change=moved / residual_scale(self.task, self.body.names, self.body.reach),
+            change=moved * reciprocal(self._scale),
             forces=twin.physics.contact[:, :3],
             least_force=self.tables.least_force[twin.physics.variant],
         )
@@ -278,13 +283,7 @@ class TrackingEnv(Env):
 
     def _start_table(self, reference: Reference) -> PhysicsState:
         """The engine's state at every frame of every demonstration, so that a reset is a look-up."""
-
-        def compute() -> dict[str, np.ndarray]:
-            states = assisted_replay(self.models, reference, self.task.substeps)
-            return {name: np.asarray(a, np.float32) for name, a in zip(("qpos", "qvel", "ctrl"), states, strict=True)}
-
-        replayed = cached(compute, *(model_bytes(m) for m in self.models), reference, self.task.substeps)
-        qpos, qvel, ctrl = (replayed[name] for name in ("qpos", "qvel", "ctrl"))
+        qpos, qvel, ctrl = cached_replay(self.models, reference, self.task.substeps)
         count, frames = qpos.shape[:2]
         # Any of a demonstration's scenes will do: what a state holds does not depend on what is varied.
         variant = np.repeat(np.arange(count, dtype=np.int32) * len(self.variations[0]), frames)

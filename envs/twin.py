@@ -16,7 +16,8 @@ from mjx_hand.pytree import pytree
 class Twin:
     """A world's state: physics, which demonstration it follows, how far it is, the residual so far, disturbances.
 
-    `episode` is None in an environment without disturbances.
+    `episode` is None in an environment without disturbances, `commanded`, what a teleoperated hand was told last
+    without its residual (m, rad), in one of other hands.
     """
 
     physics: PhysicsState
@@ -24,6 +25,7 @@ class Twin:
     frame: Int[Array, "*b"]
     residual: Float[Array, "*b u"]
     episode: Episode | None = None
+    commanded: Float[Array, "*b u"] | None = None
 
 
 @pytree

@@ -20,7 +20,7 @@ from PIL import Image
 from envs.demonstrations.contact_sheet import contact_sheet
 from envs.demonstrations.dataset import AS_RECORDED, VARIED, YIELD, make_sealed, make_set
 from envs.demonstrations.load_set import PARTS, SEALED, load_part
-from envs.demonstrations.quality import check_part
+from envs.demonstrations.quality import check_part, check_streamed
 from envs.demonstrations.recordings.recording_page import RECORDINGS
 from envs.demonstrations.scripted.perform import OUTCOMES
 from envs.demonstrations.scripted.trials import NO_POSTURE, SPARE
@@ -91,8 +91,10 @@ def _make_and_show(settings: SetSettings, root: Path, sealed: bool) -> None:
         folder = make_sealed(settings, root, report) if sealed else make_set(settings, root, report)
     parts = (SEALED,) if sealed else PARTS
     yields = json.loads((folder / YIELD).read_text())
-    quality = [] if settings.grasp == RECORDED else _quality_rows(folder, parts)
-    print_table(str(folder), ("", *parts), _yield_rows(yields, parts) + quality)
+    rows = _yield_rows(yields, parts)
+    if settings.grasp != RECORDED:
+        rows += _streamed_rows(folder, parts) if settings.streamed else _quality_rows(folder, parts)
+    print_table(str(folder), ("", *parts), rows)
     if settings.grasp == RECORDED:
         _print_recordings(folder)
     demonstrations = load_part(folder, parts[0])
@@ -123,6 +125,15 @@ def _quality_rows(folder: Path, parts: Sequence[str]) -> list[tuple[str, ...]]:
         ("hinges from the truth (°)", *(_range(np.rad2deg(q.angle_error)) for q in measured)),
         ("wrist from the truth (mm)", *(_range(1000 * q.wrist_error) for q in measured)),
         ("object from the truth, at most (mm)", *(_range(1000 * q.object_error) for q in measured)),
+    ]
+
+
+def _streamed_rows(folder: Path, parts: Sequence[str]) -> list[tuple[str, ...]]:
+    measured = [check_streamed(folder, part) for part in parts]
+    return [
+        ("length (s)", *(_range(q.seconds) for q in measured)),
+        ("tracked hinges from the hand's (°)", *(_range(np.rad2deg(q.angle_error)) for q in measured)),
+        ("tracked wrist from the hand's (mm)", *(_range(1000 * q.wrist_error) for q in measured)),
     ]
 
 

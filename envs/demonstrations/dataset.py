@@ -4,7 +4,7 @@ A set is a folder of `train/NNN.npz` and `heldout/NNN.npz` (schema mjx-hand/demo
 motion that was fitted to its markers, `NNN.motion.npz` (which `mjx-hand retarget` reads), and its truth,
 `NNN.truth.npz`; `yield.json` counts what came of all attempts. Training and held-out demonstrations come from different
 people, object sizes and seeds. A set made from real recordings holds variations of them, a page for
-each, and neither motions nor truth.
+each, and neither motions nor truth; a streamed one neither of these.
 """
 
 import dataclasses
@@ -23,8 +23,10 @@ from envs.demonstrations.scripted.own_object import own_object
 from envs.demonstrations.scripted.simulated_capture import load_truth, project_recording, record_trials, save_truth
 from envs.demonstrations.scripted.trials import perform_trials
 from envs.demonstrations.set_settings import SetSettings, sealed_folder, seed_of_sealed, set_folder
+from envs.demonstrations.streamed_hand import streamed_demonstration
 from envs.grasps import grasp_type
 from envs.grip_force import RECORDED
+from mjx_hand.files.digests import json_digest
 from mjx_hand.files.npz_archive import replacing
 from mjx_hand.files.working_folder import remove_abandoned, working_folder
 from mjx_hand.hand.load import load_hand
@@ -69,6 +71,9 @@ def make_set(settings: SetSettings, root: str | Path, report: Report = lambda wh
     def fill(temporary: Path) -> Yields:
         if settings.grasp == RECORDED:
             return _make_variations(settings, temporary, report)
+        if settings.streamed:
+            recorded = make_set(dataclasses.replace(settings, streamed=False), root, report)
+            return _stream(recorded, settings, temporary, PARTS, report)
         if settings.side == "left":
             right = dataclasses.replace(settings, side="right")
             return _mirror(make_set(right, root, report), temporary, PARTS)
@@ -91,6 +96,9 @@ def make_sealed(settings: SetSettings, root: str | Path, report: Report = lambda
     """
 
     def fill(temporary: Path) -> Yields:
+        if settings.streamed:
+            recorded = make_sealed(dataclasses.replace(settings, streamed=False), root, report)
+            return _stream(recorded, settings, temporary, [SEALED], report)
         if settings.side == "left":
             right = make_sealed(dataclasses.replace(settings, side="right"), root, report)
             return _mirror(right, temporary, [SEALED])
@@ -192,6 +200,20 @@ def _mirror(right: Path, folder: Path, parts: Sequence[str]) -> Yields:
         )
         save_truth(mirrored, there / f"{path.stem}.truth.npz")
     return json.loads((right / YIELD).read_text())
+
+
+def _stream(recorded: Path, settings: SetSettings, folder: Path, parts: Sequence[str], report: Report) -> Yields:
+    """Make parts from a set's, with what a live tracker made of each hand; what came of that set's attempts."""
+    paths = [path for part in parts for path in demonstration_files(recorded, part)]
+    for k, path in enumerate(paths):
+        report(f"streaming {settings.grasp} recordings", k / len(paths))
+        there = folder / path.parent.name
+        there.mkdir(exist_ok=True)
+        # Every demonstration of every part and type is seen by a tracker of its own.
+        drawn = [settings.grasp, settings.seed, settings.sealed_seed * (SEALED in parts), path.parent.name, path.stem]
+        streamed = streamed_demonstration(load_demonstration(path), seed=int(json_digest(drawn)[:8], 16))
+        save_demonstration(streamed, there / path.name)
+    return json.loads((recorded / YIELD).read_text())
 
 
 def _make_variations(settings: SetSettings, folder: Path, report: Report) -> Yields:

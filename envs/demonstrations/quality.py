@@ -11,9 +11,8 @@ from envs.demonstrations.scripted.simulated_capture import load_truth
 from mjx_hand.errors import InputError
 
 LIFT = 0.095  # m that every demonstration must lift its object: 10 cm, less what soft pads give
-_STRAY = (
-    0.01  # m that the measured object may be from the true one: the filter rounds off how a handle leaves its posts
-)
+# m that the measured object may be from the true one: the filter rounds off how a handle leaves its posts
+_STRAY = 0.01
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,3 +65,35 @@ def check_part(folder: str | Path, part: str) -> Quality:
                 "delete the folder and make the set anew, or mend the grasp type"
             )
     return quality
+
+
+@dataclasses.dataclass(frozen=True)
+class Tracking:
+    """How far a tracker had the hands of n demonstrations from where they were.
+
+    Attributes:
+        seconds: how long each is.
+        angle_error, wrist_error: mean distance of the hinges (rad) and of the wrist (m).
+    """
+
+    seconds: Float[np.ndarray, "n"]
+    angle_error: Float[np.ndarray, "n"]
+    wrist_error: Float[np.ndarray, "n"]
+
+
+def check_streamed(folder: str | Path, part: str) -> Tracking:
+    """Read one part of a streamed set back.
+
+    Raises:
+        InputError: a file is missing or damaged, or none looked on.
+    """
+    rows = []
+    for k, d in enumerate(load_part(folder, part)):
+        if d.tracked is None:
+            raise InputError(
+                f"{Path(folder, part)}: demonstration {k} is not streamed; delete the folder, make it anew"
+            )
+        place, _, angles = np.split(d.tracked, [3, 7], axis=1)
+        off = np.linalg.norm(place - d.motion.wrist_position, axis=1).mean()
+        rows.append((d.num_frames / d.motion.fps, np.abs(angles - d.motion.angles).mean(), off))
+    return Tracking(*np.array(rows).T)

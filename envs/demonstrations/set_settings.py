@@ -17,6 +17,7 @@ ALL = "all"
 GIVEN = "given"
 _VERSION = 4  # of the generator: a change that makes other demonstrations of the same settings raises it
 _RECORDED_VERSION = 5  # the same of what is made of a recording
+_STREAMED_VERSION = 1  # the same of how a tracker sees hands (`envs.demonstrations.streamed_hand`)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,6 +37,8 @@ class SetSettings:
         seed: of every draw; the held-out part uses the next one.
         capture: how they are recorded.
         recording: the real recording, and how it is varied; of the other settings it uses the seed.
+        streamed: whether what a live tracker makes of the hand, late and with noise, stands beside how it moved
+            (`envs.demonstrations.streamed_hand`); of scripted grasps.
         side: of the hand that scripted grasps are of; a left one's are mirror images of the right one's. A recording
             has its own.
         folder: of finished demonstrations, as `load_set.load_part` reads it.
@@ -54,6 +57,7 @@ class SetSettings:
     seed: int = 0
     capture: CaptureSettings = dataclasses.field(default_factory=CaptureSettings)
     recording: RecordingSettings = dataclasses.field(default_factory=RecordingSettings)
+    streamed: bool = False
     side: str = "right"
     folder: str = ""
     object: str = ""
@@ -69,6 +73,11 @@ class SetSettings:
             raise InputError(
                 f"data.side is {self.side!r} and data.grasp {self.grasp!r}; it is of scripted grasps, "
                 "a recording's hand is chosen by data.recording.side"
+            )
+        if self.streamed and self.grasp in (RECORDED, GIVEN):
+            raise InputError(
+                f"data.streamed is true and data.grasp {self.grasp!r}; it is of scripted grasps: "
+                f"{', '.join(grasp_names())}, {ALL}"
             )
         if (self.grasp == GIVEN) != bool(self.folder):
             raise InputError(
@@ -159,8 +168,13 @@ def fingerprint(settings: SetSettings) -> dict[str, Any]:
     del told["folder"]  # what it holds tells, not where it is: `load_set.part_digest`
     if settings.grasp != RECORDED:
         del told["recording"]
-    if settings.side == "right":  # sets from before there were left ones keep their names
+    # Right hands' sets, and those that no tracker saw, keep the names that they had before there were others.
+    if settings.side == "right":
         del told["side"]
+    if settings.streamed:
+        told["streamed"] = _STREAMED_VERSION
+    else:
+        del told["streamed"]
     if settings.object:
         told["object"] = mesh_digest(settings.object)
     else:  # sets from before there were own objects keep their names

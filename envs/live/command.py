@@ -13,6 +13,7 @@ from typing import Annotated, Literal
 
 import tyro
 
+from envs.live.assistance import assistance
 from envs.live.service.certificate import secure_context
 from envs.live.session import serving
 from envs.live.sources.datagrams import Datagrams
@@ -40,7 +41,8 @@ def live(
     fps: float | None = None,
     once: bool = False,
     seconds: float | None = None,
-    assist: Literal["off", "grip"] = "off",
+    assist: Literal["off", "grip", "policy"] = "off",
+    policy: Path | None = None,
     camera: int = 0,
     host: str = "127.0.0.1",
     port: int = PORT,
@@ -63,8 +65,10 @@ def live(
         fps: frames a second, of a recording that does not say.
         once: end with the recording, which else begins again.
         seconds: end after that time.
-        assist: grip presses what the fingers touch, as the references of training do; off leaves fingers as they are
-            tracked.
+        assist: policy lets a trained policy move the fingers beside their tracked way, so that they hold what they
+            reach for; grip presses what the fingers touch, as the references of training do; off leaves fingers as
+            they are tracked.
+        policy: of your own for --assist policy: what train.export writes of a run of config=live.
         camera: number of the webcam.
         host: address to listen on; 0.0.0.0, or this computer's own, lets other computers and headsets in.
         port: of the page and of websockets; 0 chooses a free one.
@@ -86,6 +90,7 @@ def live(
         raise InputError(f"{source}: a demonstration has an object of its own; leave out --object")
     table: Tabletop = demonstration_table(shown) if shown is not None else tabletop(object or _OBJECT, mass)
     which = frames.side if isinstance(frames, Recorded) else side or "right"
+    helper = assistance(assist, which, policy)
     _say("one moment")
     token = token or secrets.token_hex(16)
     with (
@@ -100,7 +105,7 @@ def live(
             publish=addresses,
             secure=secure,
             folder=out,
-            assist=assist,
+            assist=helper,
         ) as session,
     ):
         _greet(source, host, session.server.port, token, secure is not None, frames)

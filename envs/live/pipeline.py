@@ -21,6 +21,7 @@ from envs.live.sources.messages import Messages
 from envs.live.sources.source import Source
 from envs.live.twin.tabletop import Tabletop
 from envs.live.twin.tracker import Tracker
+from envs.live.twin.world import OFF, Assist
 from mjx_hand.errors import InputError
 
 _LOST = 0.25  # s without a frame after which the hand is not seen
@@ -50,7 +51,7 @@ class Pipeline:
         folder: Path,
         timing: Timing,
         feed: Feed,
-        assist: str = "off",
+        assist: Assist = OFF,
     ):
         self._source, self._tracker, self._table, self._side = source, tracker, table, side
         self._timing = timing

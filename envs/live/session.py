@@ -15,6 +15,7 @@ from envs.live.sources.recorded import Recorded
 from envs.live.sources.source import Source
 from envs.live.twin.tabletop import Tabletop
 from envs.live.twin.tracker import Tracker
+from envs.live.twin.world import OFF, Assist
 
 
 class Session(NamedTuple):
@@ -43,7 +44,7 @@ def serving(
     publish: tuple[tuple[str, int], ...] = (),
     secure: ssl.SSLContext | None = None,
     folder: Path = Path("outputs/live"),
-    assist: str = "off",
+    assist: Assist = OFF,
 ) -> Iterator[Session]:
     """Compile, serve, and run, until the end of the block.
 

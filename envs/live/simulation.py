@@ -16,7 +16,7 @@ from envs.live.twin.pose import HandPose
 from envs.live.twin.recorder import Recorder, save_recording
 from envs.live.twin.tabletop import Tabletop
 from envs.live.twin.tracker import Tracker
-from envs.live.twin.world import World
+from envs.live.twin.world import OFF, Assist, World
 from mjx_hand.errors import InputError
 from mjx_hand.motion.scene import RecordedScene
 
@@ -55,8 +55,9 @@ class Simulation:
         recording: whether what the twin does is recorded.
     """
 
-    def __init__(self, table: Tabletop, side: str, folder: Path, timing: Timing, feed: Feed, assist: str = "off"):
-        self._table, self._side, self._folder, self._assist = table, side, folder, assist
+    def __init__(self, table: Tabletop, side: str, folder: Path, timing: Timing, feed: Feed, assist: Assist = OFF):
+        self._table, self._side, self._folder = table, side, folder
+        self._assist: Assist = assist
         self._timing, self._feed = timing, feed
         self._wishes: set[str] = set()
         self._number, self._shown = 0, 0.0

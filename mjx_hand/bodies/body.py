@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Array, Int
 
-from mjx_hand.player.features import WRIST, HandNames
+from mjx_hand.player.observed_state import WRIST, HandNames
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand
 

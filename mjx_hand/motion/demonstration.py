@@ -23,6 +23,7 @@ _LAYOUT: dict[str, tuple[int | str, ...]] = {
     "shape": ("s",),
 }
 _HINGES: dict[str, tuple[int | str, ...]] = {"hinge_axis": (20, 3), "rest_rotation": (15, 3, 3)}
+_TRACKED = "tracked"
 
 
 @pytree
@@ -38,6 +39,8 @@ class Demonstration:
         shape: MANO shape coefficients of the person, from which the twin's hand is built.
         hinge_axis, rest_rotation: of the twin's hinges, as in `RigidHand`, where the angles belong to others than those
             that the shape's hand is built with; else None.
+        tracked: where a live tracker had the hand, late and with noise, while it moved as `motion` says: wrist position
+            and quaternion and hinge angles; None where none looked on.
         grasp: name of the grasp type.
         source: provenance, one line.
     """
@@ -50,6 +53,7 @@ class Demonstration:
     shape: Float[np.ndarray, "s"]
     hinge_axis: Float[np.ndarray, "20 3"] | None = None
     rest_rotation: Float[np.ndarray, "15 3 3"] | None = None
+    tracked: Float[np.ndarray, "t 27"] | None = None
     grasp: str = static()
     source: str = static(default="")
 
@@ -62,7 +66,7 @@ class Demonstration:
 def save_demonstration(demonstration: Demonstration, path: str | Path) -> None:
     """Write as `.npz` (schema mjx-hand/demonstration/2)."""
     d, m = demonstration, demonstration.motion
-    hinges = {name: value for name in _HINGES if (value := getattr(d, name)) is not None}
+    optional = {name: value for name in (*_HINGES, _TRACKED) if (value := getattr(d, name)) is not None}
     save_arrays(
         path,
         SCHEMA,
@@ -85,7 +89,7 @@ def save_demonstration(demonstration: Demonstration, path: str | Path) -> None:
             "shape": d.shape,
             "grasp": d.grasp,
             "source": d.source,
-            **hinges,
+            **optional,
             **({"warnings": np.array(m.warnings)} if m.warnings else {}),
         },
     )
@@ -100,8 +104,9 @@ def load_demonstration(path: str | Path) -> Demonstration:
     a = load_arrays(path, SCHEMA)
     source = text(path, a, "source")
     motion = joint_motion_of(path, a, source)
-    hinges = {name: shape for name, shape in _HINGES.items() if name in a}
-    n = numbers(path, a, _LAYOUT | hinges | {"object_pose": (motion.num_frames, 7)})
+    layout = _HINGES | {_TRACKED: (motion.num_frames, 27)}
+    optional = {name: shape for name, shape in layout.items() if name in a}
+    n = numbers(path, a, _LAYOUT | optional | {"object_pose": (motion.num_frames, 7)})
     kind = text(path, a, "object_kind")
     if kind not in OBJECT_KINDS:
         raise InputError(f"{path}: object_kind is {kind!r}; known: {', '.join(OBJECT_KINDS)}")
@@ -124,6 +129,7 @@ def load_demonstration(path: str | Path) -> Demonstration:
         shape=n["shape"],
         hinge_axis=n.get("hinge_axis"),
         rest_rotation=n.get("rest_rotation"),
+        tracked=n.get(_TRACKED),
         grasp=text(path, a, "grasp"),
         source=source,
     )

@@ -40,8 +40,10 @@ def mirrored_motion(motion: Motion) -> Motion:
 def mirrored_demonstration(demonstration: Demonstration) -> Demonstration:
     """The demonstration's mirror image in x: the other hand with the mirrored object on mirrored supports."""
     d = demonstration
-    hinges = {} if d.hinge_axis is None else {"hinge_axis": d.hinge_axis * _AXIS}
-    hinges |= {} if d.rest_rotation is None else {"rest_rotation": d.rest_rotation * _MATRIX}
+    own = {} if d.hinge_axis is None else {"hinge_axis": d.hinge_axis * _AXIS}
+    own |= {} if d.rest_rotation is None else {"rest_rotation": d.rest_rotation * _MATRIX}
+    if d.tracked is not None:
+        own["tracked"] = np.concatenate([mirrored_pose(d.tracked[:, :7]), d.tracked[:, 7:]], axis=1)
     motion = replace(
         d.motion,
         wrist_position=d.motion.wrist_position * _PLACE,
@@ -54,5 +56,5 @@ def mirrored_demonstration(demonstration: Demonstration) -> Demonstration:
         object_pose=mirrored_pose(d.object_pose),
         object=replace(d.object, hulls=d.object.hulls * _PLACE),
         support_position=d.support_position * _PLACE,
-        **hinges,
+        **own,
     )

@@ -30,3 +30,9 @@ class ObjectDescription:
     friction: float
     hulls: Float[np.ndarray, "h v 3"] = dataclasses.field(default_factory=lambda: np.zeros((0, 0, 3)))
     kind: str = static()
+
+
+def object_features(description: ObjectDescription) -> Float[np.ndarray, "f"]:
+    """What of an object a policy may be told: size (m), mass (kg), friction, and 1 for its kind of `OBJECT_KINDS`."""
+    kinds = [float(description.kind == kind) for kind in OBJECT_KINDS]
+    return np.array([*description.size, description.mass, description.friction, *kinds], float)

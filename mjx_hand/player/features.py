@@ -16,82 +16,15 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from mjx_hand.hand.joints import FINGERS, HINGES, LINKS, WRIST_SLIDES, WRIST_TURNS
+from mjx_hand.player.observed_state import HUMAN_NAMES, WRIST, HandNames, ObservedState
 
 OBSERVATION_LIMIT = 5.0  # of an observation
-WRIST = (*WRIST_SLIDES, *WRIST_TURNS)
 _NUM_WRIST = len(WRIST)
 _XYZ = ("x", "y", "z")
 CONTACT_FORCES = "contact_forces"  # a feature's name
+# What only policies of teleoperated hands see: others know it from the demonstration.
+LIVE_ONLY = frozenset({"hinges", "object_velocity_in_hand", "down_in_hand"})
 _PER_LENGTH = 30.0  # 1/m, for errors of the object: 3 cm
-
-
-@dataclasses.dataclass(frozen=True)
-class HandNames:
-    """What a hand's numbers are called, in order: its actuated joints, without the wrist's, its fingers, and its links
-    that touch."""
-
-    joints: tuple[str, ...] = HINGES
-    fingers: tuple[str, ...] = FINGERS
-    links: tuple[str, ...] = LINKS
-
-    @property
-    def targets(self) -> tuple[str, ...]:
-        """What is commanded: the wrist's slides and turns, then the joints."""
-        return (*WRIST, *self.joints)
-
-
-HUMAN_NAMES = HandNames()
-TARGETS = HUMAN_NAMES.targets
-
-
-@dataclasses.dataclass(frozen=True)
-class ObservedState:
-    """A world at a frame of a demonstration, and the demonstration there; metres, radians, seconds, wxyz.
-
-    Arrays of either kind. h is the number of frames that the policy sees ahead; past its end a demonstration's last
-    frame is held.
-
-    Attributes:
-        hand, hand_speed: (u,) coordinates and speeds of the wrist's slides and turns and of the actuated joints.
-        residual: (u,) the filtered residual so far.
-        object_pose: (7,) in the world.
-        object_speed: (6,) linear in the world, angular in the object's own axes.
-        object_turn: (3,) rotation vector, in the reference's own axes, that takes the reference's orientation to the
-            object's.
-        object_axes: (3, 3) world_from_object.
-        wrist_place, wrist_axes: (3,) and (3, 3) world_from_hand.
-        tips: (fingers, 3) finger tips in the world.
-        forces: (links, 3) what each link presses the object with (N, world) in the last physics step.
-        base: (3, 3) world_from_base of the scene's wrist.
-        target, grip: (u,) demonstrated coordinates, and the share of the controls that presses.
-        pose: (7,) demonstrated object.
-        first_pose: (7,) of the demonstration's first frame.
-        targets_ahead, poses_ahead: (h, u) and (h, 7) demonstrated some frames ahead.
-        phase: (1,) share of the demonstration that is over.
-        object_features: size (m), mass (kg), friction, and 1 for the kind.
-    """
-
-    hand: Any
-    hand_speed: Any
-    residual: Any
-    object_pose: Any
-    object_speed: Any
-    object_turn: Any
-    object_axes: Any
-    wrist_place: Any
-    wrist_axes: Any
-    tips: Any
-    forces: Any
-    base: Any
-    target: Any
-    grip: Any
-    pose: Any
-    first_pose: Any
-    targets_ahead: Any
-    poses_ahead: Any
-    phase: Any
-    object_features: Any
 
 
 @dataclasses.dataclass(frozen=True)
@@ -106,6 +39,7 @@ class Feature:
         value: of what is seen; its numbers in row-major order.
         scale: one over what it usually varies by, one number or one each.
         offset: what it usually is.
+        of_demonstration: whether it tells where a demonstration takes hand and object, or is in its frames.
     """
 
     name: str
@@ -116,6 +50,7 @@ class Feature:
     value: Callable[[ObservedState], Any]
     scale: float | Sequence[float] | Float[np.ndarray, "n"] = 1.0
     offset: float | Sequence[float] = 0.0
+    of_demonstration: bool = False
 
     @property
     def size(self) -> int:
@@ -138,10 +73,26 @@ def feature_table(
         hand: names of its joints and fingers.
     """
     relative_to, targets = "relative to the demonstrated", hand.targets
+    per_residual = reciprocal(residual_scale)
     return (
-        *_of_targets(targets, "error", f"coordinate {relative_to} one", lambda s: s.hand - s.target, (50.0, 5.0, 5.0)),
-        *_of_targets(targets, "speed", "speed", lambda s: s.hand_speed, (5.0, 0.5, 0.2), per="/s"),
-        *_of_targets(targets, "residual", "filtered residual so far", lambda s: s.residual, 1 / residual_scale),
+        *_of_targets(
+            targets,
+            "error",
+            f"coordinate {relative_to} one",
+            lambda s: s.hand - s.target,
+            (50.0, 5.0, 5.0),
+            wrist_of_demonstration=True,
+        ),
+        *_of_targets(
+            targets,
+            "speed",
+            "speed",
+            lambda s: s.hand_speed,
+            (5.0, 0.5, 0.2),
+            per="/s",
+            wrist_of_demonstration=True,
+        ),
+        *_of_targets(targets, "residual", "filtered residual so far", lambda s: s.residual, per_residual),
         Feature(
             "grip",
             "share of the controls that presses",
@@ -150,6 +101,7 @@ def feature_table(
             hand.joints,
             lambda s: s.grip[_NUM_WRIST:],
             5.0,
+            of_demonstration=True,
         ),
         Feature(
             "object_position_error",
@@ -159,6 +111,7 @@ def feature_table(
             _XYZ,
             lambda s: s.base.T @ (s.object_pose[:3] - s.pose[:3]),
             _PER_LENGTH,
+            of_demonstration=True,
         ),
         Feature(
             "object_rotation_error",
@@ -168,9 +121,17 @@ def feature_table(
             _XYZ,
             lambda s: s.object_turn,
             3.0,
+            of_demonstration=True,
         ),
         Feature(
-            "object_velocity", "object's velocity", "m/s", "base", _XYZ, lambda s: s.base.T @ s.object_speed[:3], 3.0
+            "object_velocity",
+            "object's velocity",
+            "m/s",
+            "base",
+            _XYZ,
+            lambda s: s.base.T @ s.object_speed[:3],
+            3.0,
+            of_demonstration=True,
         ),
         Feature("object_angular_velocity", "object's", "rad/s", "object", _XYZ, lambda s: s.object_speed[3:], 0.2),
         Feature(
@@ -203,7 +164,17 @@ def feature_table(
         ),
         *(feature for k, ahead in enumerate(lookahead) for feature in _of_frame_ahead(targets, k, ahead)),
         *(_of_object_ahead(k, ahead) for k, ahead in enumerate(lookahead)),
-        Feature("phase", "share of the demonstration that is over", "1", "-", ("share",), lambda s: s.phase, 2.0, 0.5),
+        Feature(
+            "phase",
+            "share of the demonstration that is over",
+            "1",
+            "-",
+            ("share",),
+            lambda s: s.phase,
+            2.0,
+            0.5,
+            of_demonstration=True,
+        ),
         Feature(
             "object_rise",
             "object's height above that of the demonstration's first frame",
@@ -212,6 +183,7 @@ def feature_table(
             ("z",),
             lambda s: s.object_pose[2:3] - s.first_pose[2:3],
             10.0,
+            of_demonstration=True,
         ),
         Feature(
             "object_size",
@@ -225,7 +197,23 @@ def feature_table(
         Feature("object_mass", "object's mass", "kg", "-", ("mass",), lambda s: s.object_features[3:4], 5.0),
         Feature("object_friction", "sliding friction", "1", "-", ("friction",), lambda s: s.object_features[4:5]),
         Feature("object_kind", "1 for its kind", "1", "-", tuple(object_kinds), lambda s: s.object_features[5:]),
+        Feature("hinges", "values of the joints", "rad", "joint", hand.joints, lambda s: s.hand[_NUM_WRIST:], 1.5, 0.5),
+        Feature(
+            "object_velocity_in_hand",
+            "object's velocity, less that of the wrist's origin",
+            "m/s",
+            "hand",
+            _XYZ,
+            lambda s: s.wrist_axes.T @ (s.object_speed[:3] - s.base @ s.hand_speed[:3]),
+            3.0,
+        ),
+        Feature("down_in_hand", "the direction of gravity", "1", "hand", _XYZ, lambda s: -s.wrist_axes[2]),
     )
+
+
+def reciprocal(scale: Float[np.ndarray, "u"]) -> Float[np.ndarray, "u"]:
+    """One over each number, 0 where it is 0: of a wrist that has no residual."""
+    return np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0)
 
 
 def offsets_and_scales(table: Sequence[Feature]) -> tuple[Float[np.ndarray, "o"], Float[np.ndarray, "o"]]:
@@ -244,6 +232,8 @@ def _of_targets(
     value: Callable[[ObservedState], Any],
     scales: Sequence[float] | Float[np.ndarray, "u"],
     per: str = "",
+    wrist_of_demonstration: bool = False,
+    of_demonstration: bool = False,
 ) -> tuple[Feature, Feature, Feature]:
     """Rows for the hand's coordinates: slides along the base's axes, turns from it, joints.
 
@@ -253,6 +243,7 @@ def _of_targets(
         value: all of them.
         scales: of the three rows, or of all.
         per: end of the unit.
+        wrist_of_demonstration, of_demonstration: see `Feature.of_demonstration`, of the wrist's rows and of all.
     """
     parts = (
         ("wrist_position", f"m{per}", "base", slice(0, 3)),
@@ -268,6 +259,7 @@ def _of_targets(
             targets[place],
             lambda s, place=place: value(s)[place],
             scales[k] if len(scales) == len(parts) else scales[place],
+            of_demonstration=of_demonstration or (wrist_of_demonstration and part != "hinges"),
         )
         for k, (part, unit, frame, place) in enumerate(parts)
     )
@@ -280,6 +272,7 @@ def _of_frame_ahead(targets: tuple[str, ...], k: int, ahead: int) -> tuple[Featu
         f"demonstrated coordinate {ahead} frames ahead, relative to the one now",
         lambda s: s.targets_ahead[k] - s.target,
         (50.0, 5.0, 5.0),
+        of_demonstration=True,
     )
 
 
@@ -292,4 +285,5 @@ def _of_object_ahead(k: int, ahead: int) -> Feature:
         _XYZ,
         lambda s: s.base.T @ (s.poses_ahead[k, :3] - s.pose[:3]),
         _PER_LENGTH,
+        of_demonstration=True,
     )

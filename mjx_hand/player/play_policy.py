@@ -12,7 +12,8 @@ from mjx_hand.errors import InputError
 from mjx_hand.player.approach import approach_weights, displacement, followed
 from mjx_hand.player.contact_force import contact_columns
 from mjx_hand.player.exported_policy import ExportedPolicy, load_exported_policy
-from mjx_hand.player.features import CONTACT_FORCES, WRIST, Feature, HandNames, ObservedState, feature_table
+from mjx_hand.player.features import CONTACT_FORCES, Feature, feature_table
+from mjx_hand.player.observed_state import WRIST, HandNames, ObservedState
 from mjx_hand.player.tracking_reference import TrackingReference, load_tracking_reference
 
 _FREE = 7  # coordinates of the object, the last of a scene's; of its speed one less
@@ -86,6 +87,11 @@ class Player:
     """
 
     def __init__(self, policy: ExportedPolicy, reference: TrackingReference, folder: Path):
+        if policy.contract.get("live", False):
+            raise InputError(
+                "this policy is of teleoperated hands and follows no demonstration; "
+                "mjx-hand live --assist policy --policy FILE plays it"
+            )
         self.policy, self.reference = policy, reference
         names = _hand(policy)
         self.model = _scene(folder / reference.scene, names)
@@ -201,7 +207,7 @@ def _hand(policy: ExportedPolicy) -> HandNames:
     """
     elements = {entry["name"]: entry["elements"] for entry in policy.contract["inputs"]}
     try:
-        joints, places = elements["grip"], elements["tips_in_object"]
+        joints, places = elements["error.hinges"], elements["tips_in_object"]
     except KeyError as missing:
         raise InputError(f"the policy's contract has no input {missing}; export the policy again") from None
     fingers = dict.fromkeys(place.rpartition("_")[0] for place in places)

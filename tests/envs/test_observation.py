@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from envs.observation import observe, observed_features
 from envs.task import Task
-from mjx_hand.player.features import CONTACT_FORCES, TARGETS, offsets_and_scales
+from mjx_hand.player.features import CONTACT_FORCES, offsets_and_scales
+from mjx_hand.player.observed_state import TARGETS
 
 TARGET_SCALE = np.concatenate([np.full(3, 50.0), np.full(23, 5.0)])
 SPEED_SCALE = np.concatenate([np.full(3, 5.0), np.full(3, 0.5), np.full(20, 0.2)])

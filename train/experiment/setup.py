@@ -15,7 +15,7 @@ from envs.evaluation.rollout import Rollouts
 from envs.tracking import TrackingEnv
 from envs.twin import Tables
 from mjx_hand.errors import InputError
-from mjx_hand.player.features import HUMAN_NAMES
+from mjx_hand.player.observed_state import HUMAN_NAMES
 from train.learning.checkpoint import Checkpoint, load_checkpoint
 from train.learning.policy import check_policy, deterministic_policy
 from train.learning.run_folder import BEST

@@ -22,6 +22,16 @@ from mjx_hand.player.tracking_reference import SCHEMA as REFERENCE_SCHEMA
 from train.learning.checkpoint import Checkpoint
 
 SCHEMA = "mjx-hand/contract/1"
+_FOLLOWING = {
+    "command": "clip(controls[min(frame + 1, last frame)] + residual, low, high), held for the whole step",
+    "elsewhere": "follow_object: where the object is not where the demonstration has it at first, controls and "
+    "targets of the wrist go there and back, as mjx_hand/player/approach.py tells",
+}
+_TELEOPERATED = {
+    "command": "clip(tracked + residual, low, high), held for the whole step; the wrist is the person's",
+    "tracked": "live: joints as they are tracked, steadied while the hand holds, as mjx_hand/player/steadying.py "
+    "tells; where inputs say demonstrated, this is meant",
+}
 _PACKAGES = ("mjx-hand", "jax", "brax", "flax", "mujoco", "numpy")
 
 
@@ -32,6 +42,7 @@ def make_contract(
     body: Body,
     difference: float,
     demonstrations: Sequence[Mapping[str, Any]],
+    side: str | None,
 ) -> dict[str, Any]:
     """What `contract.json` holds.
 
@@ -42,6 +53,7 @@ def make_contract(
         body: that it moves.
         difference: largest, of an action from Brax's inference.
         demonstrations: what each that is written beside it is.
+        side: of the hands that it was trained on, None where that is not known.
     """
     table, targets, units = observed_features(task, body.names, body.reach), list(body.names.targets), _units(body)
     starts = np.cumsum([0, *(feature.size for feature in table)])[:-1].tolist()
@@ -60,9 +72,7 @@ def make_contract(
             "scaled": "clip((features - offset) * scale, -limit, limit)",
             "action": "clip(network(scaled), -1, 1)",
             "residual": "smoothing * features[residual] + (1 - smoothing) * residual_scale * action",
-            "command": "clip(controls[min(frame + 1, last frame)] + residual, low, high), held for the whole step",
-            "elsewhere": "follow_object: where the object is not where the demonstration has it at first, controls and "
-            "targets of the wrist go there and back, as mjx_hand/player/approach.py tells",
+            **(_TELEOPERATED if task.live else _FOLLOWING),
             "limit": OBSERVATION_LIMIT,
             "smoothing": task.smoothing,
             "residual_scale": [float(value) for value in policy.residual_scale],
@@ -72,6 +82,8 @@ def make_contract(
         "rate": {"control_hz": 1 / (TIMESTEP * task.substeps), "substeps": task.substeps, "physics_step_s": TIMESTEP},
         "lookahead": list(task.lookahead),
         "follow_object": task.follow_object,
+        "live": task.live,
+        "side": side,
         "object_kinds": list(OBJECT_KINDS),
         "inputs": [_input(feature, start, units) for feature, start in zip(table, starts, strict=True)],
         "outputs": [

@@ -46,12 +46,14 @@ def export_policy(config: Config) -> Path:
     checkpoint = chosen_checkpoint(config, size, body.num_targets)
     bare = exported_policy(checkpoint.policy, config.task, body)
     difference = difference_from_brax(bare, checkpoint.policy, config.ppo)
-    env = None if config.export.demonstrations == 0 else _env(config, included)
+    if config.task.live and config.export.demonstrations:
+        raise InputError("export.demonstrations: a policy of teleoperated hands follows no demonstration; leave it out")
+    env = None if config.task.live or config.export.demonstrations == 0 else _env(config, included)
     folder = Path(config.export.folder or Path(config.out) / "export")
     with filling(folder) as temporary:
         told = [] if env is None else save_demonstrations(env, _count(config, env), temporary)
         policy = dataclasses.replace(
-            bare, contract=make_contract(bare, checkpoint, config.task, body, difference, told)
+            bare, contract=make_contract(bare, checkpoint, config.task, body, difference, told, _side(config))
         )
         _save(policy, config.export.to, temporary)
         (temporary / _CONTRACT).write_text(json.dumps(policy.contract, indent=1) + "\n")
@@ -59,6 +61,12 @@ def export_policy(config: Config) -> Path:
         same = _digest(folder) == policy.digest
     _remove_old(folder, policy.contract, config.export.to if not same else _FILES)
     return folder
+
+
+def _side(config: Config) -> str | None:
+    """Of the hands that a policy was trained on, where its settings tell."""
+    data = config.data
+    return None if data.folder else (data.recording.side or None) if data.recording.path else data.side
 
 
 def _env(config: Config, included: bool) -> TrackingEnv:

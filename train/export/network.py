@@ -13,7 +13,7 @@ from envs.task import Task
 from mjx_hand.bodies.body import Body
 from mjx_hand.errors import InputError
 from mjx_hand.player.exported_policy import ExportedPolicy, Layer
-from mjx_hand.player.features import OBSERVATION_LIMIT, offsets_and_scales
+from mjx_hand.player.features import OBSERVATION_LIMIT, offsets_and_scales, reciprocal
 from train.learning.policy import deterministic_policy
 from train.settings.options import Ppo
 
@@ -68,7 +68,7 @@ def difference_from_brax(policy: ExportedPolicy, parameters: Mapping[str, Any], 
         InputError: it is more than 1e-5.
     """
     spread = (policy.limit + 1) * np.random.default_rng(0).uniform(-1, 1, (INPUTS, policy.offset.size))
-    features = (policy.offset + spread / policy.scale).astype(np.float32)
+    features = (policy.offset + spread * reciprocal(policy.scale)).astype(np.float32)
     difference = float(np.abs(policy.step(features)[0] - brax_actions(policy, parameters, ppo, features)).max())
     if not difference <= TOLERANCE:
         raise InputError(

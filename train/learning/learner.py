@@ -19,6 +19,7 @@ from brax.training.agents.ppo import losses, networks
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from jaxtyping import Array, Float, Int, UInt
 
+from envs.commands import EXPERT
 from envs.parallel import ParallelEnv
 from envs.twin import Tables
 from mjx_hand.errors import InputError
@@ -218,20 +219,31 @@ def _update(
     policy = networks.make_inference_fn(made)((None, state.params.policy, state.params.value))
     info = state.worlds.info
     worlds = state.worlds.replace(info={**info, "progress": jnp.full_like(info["progress"], progress)})  # type: ignore[attr-defined]
-    worlds, data = acting.generate_unroll(env, worlds, policy, acting_key, ppo.unroll_length, extra_fields=_EXTRAS)
+    extras = (*_EXTRAS, EXPERT) if ppo.imitation else _EXTRAS
+    worlds, data = acting.generate_unroll(env, worlds, policy, acting_key, ppo.unroll_length, extra_fields=extras)
     data = jax.tree.map(lambda leaf: jnp.swapaxes(leaf, 0, 1), data)  # one row per world: minibatches are of rows
 
-    gradient = jax.grad(
-        functools.partial(
-            losses.compute_ppo_loss,
-            ppo_network=made,
-            entropy_cost=ppo.entropy_cost,
-            discounting=ppo.discounting,
-            gae_lambda=ppo.gae_lambda,
-            clipping_epsilon=ppo.clipping_epsilon,
-        ),
-        has_aux=True,
+    ppo_loss = functools.partial(
+        losses.compute_ppo_loss,
+        ppo_network=made,
+        entropy_cost=ppo.entropy_cost,
+        discounting=ppo.discounting,
+        gae_lambda=ppo.gae_lambda,
+        clipping_epsilon=ppo.clipping_epsilon,
     )
+
+    def loss(params: Networks, normalizer: None, rows: Any, key: Array) -> tuple[Any, Any]:
+        total, metrics = ppo_loss(params, normalizer, rows, key)  # type: ignore[arg-type]
+        if not ppo.imitation:
+            return total, metrics
+        weight = ppo.imitation * jnp.clip(1 - progress / ppo.imitation_until, 0.0, 1.0)
+        mean = made.parametric_action_distribution.mode(
+            made.policy_network.apply(normalizer, params.policy, rows.observation)
+        )
+        off = jnp.sum((mean - rows.extras["state_extras"][EXPERT]) ** 2, axis=-1).mean()
+        return total + weight * off, {**metrics, "imitation_loss": off}
+
+    gradient = jax.grad(loss, has_aux=True)
     rows = ppo.num_envs // devices
 
     def minibatch(carry: Any, row: Any) -> tuple[Any, Any]:

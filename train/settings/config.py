@@ -28,6 +28,7 @@ from mjx_hand.robots.robot_hand import load_robot
 from train.settings.device import DEVICES, use_device
 from train.settings.options import Checks, Debug, Distributed, Export, Play, Ppo
 from train.settings.overrides import completed, old_names, options_given
+from train.settings.teleoperation import check_teleoperation
 
 _SEEDS = 2**31  # JAX's keys are made of 32 bits, with a sign
 Settled = Callable[["Config", Sequence[str]], "Config"]
@@ -100,6 +101,7 @@ class Config:
                 raise InputError(f"seed is {seed}; valid: 0 to {_SEEDS - 1}")
         if self.device not in DEVICES:
             raise InputError(f"device is {self.device!r}; valid: auto, {', '.join(DEVICES)}")
+        check_teleoperation(self.task, self.ppo, self.data, self.hand)
 
 
 def compose(overrides: Sequence[str] = ()) -> Config:

@@ -19,6 +19,9 @@ class Ppo:
         unroll_length: steps of each world between updates.
         num_minibatches, num_updates_per_batch: gradient steps an update are their product.
         learning_rate, entropy_cost, discounting, gae_lambda, clipping_epsilon, max_grad_norm: as usual.
+        imitation: weight of the policy's squared distance from an expert's actions in the states that the policy gets
+            to (as in DAgger, Ross et al. 2011, https://arxiv.org/abs/1011.0686), which there are for teleoperated hands
+            (`task.live`); it fades to nothing, linearly, over the share `imitation_until` of the training.
         policy_layers, value_layers: hidden layer sizes.
         initial_std: standard deviation of actions at first; a residual of 1 is the task's full range.
     """
@@ -35,6 +38,8 @@ class Ppo:
     gae_lambda: float = 0.95
     clipping_epsilon: float = 0.2
     max_grad_norm: float = 1.0
+    imitation: float = 0.0
+    imitation_until: float = 0.5
     policy_layers: tuple[int, ...] = (128, 128)
     value_layers: tuple[int, ...] = (256, 256)
     initial_std: float = 0.25
@@ -50,13 +55,15 @@ class Ppo:
             "learning_rate",
             "clipping_epsilon",
             "max_grad_norm",
+            "imitation_until",
             "initial_std",
         ):
             value = getattr(self, name)
             if value is not None and not 0 < value < math.inf:
                 raise InputError(f"ppo.{name} is {value}; it must be a number above 0")
-        if not 0 <= self.entropy_cost < math.inf:
-            raise InputError(f"ppo.entropy_cost is {self.entropy_cost}; it must be a number that is not negative")
+        for name in ("entropy_cost", "imitation"):
+            if not 0 <= getattr(self, name) < math.inf:
+                raise InputError(f"ppo.{name} is {getattr(self, name)}; it must be a number that is not negative")
         for name in ("discounting", "gae_lambda"):
             if not 0 < getattr(self, name) <= 1:
                 raise InputError(f"ppo.{name} is {getattr(self, name)}; it must be above 0 and at most 1")

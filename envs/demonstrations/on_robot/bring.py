@@ -98,7 +98,7 @@ def moved_by(
         source=f"{demonstration.motion.source} on {body.name}",
         joint_names=body.joints,
     )
-    return replace(demonstration, motion=motion)
+    return replace(demonstration, motion=motion, tracked=None)  # a tracker saw the person's hand
 
 
 class _Bringing:

@@ -4,7 +4,6 @@ import threading
 import time
 from pathlib import Path
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -12,9 +11,9 @@ from envs.demonstrations.twin_hands import twins
 from envs.live.flow.arrival import Arrival
 from envs.live.flow.timing import Timing
 from envs.live.sources.source import Put
+from envs.live.twin.hinge_keypoints import hinge_keypoints
 from envs.live.twin.person import KnownHand
 from mjx_hand.capture.keypoint_files.load_keypoints import is_keypoint_file, load_keypoints
-from mjx_hand.capture.keypoints.layouts import hand_keypoints
 from mjx_hand.capture.keypoints.side import known_side
 from mjx_hand.capture.load_scene import load_scene
 from mjx_hand.errors import InputError
@@ -22,10 +21,8 @@ from mjx_hand.files.npz_archive import schema_of
 from mjx_hand.hand.load import load_hand
 from mjx_hand.motion import demonstration
 from mjx_hand.motion.demonstration import Demonstration, load_demonstration
-from mjx_hand.motion.resample import quaternion_matrices
 from mjx_hand.retarget.sequence import rigid_hand_of
 from mjx_hand.rigid.build import build_rigid_hand
-from mjx_hand.rigid.rigid_hand import RigidHand, forward_kinematics, tip_positions
 from mjx_hand.robots.motion_keypoints import motion_keypoints
 
 _CAMERAS = ("mediapipe", "vision")  # layouts whose frames mostly are a camera's, y down
@@ -138,18 +135,6 @@ def demonstration_source(shown: Demonstration, name: str, loop: bool = True) -> 
         hand=KnownHand(rigid, np.asarray(shown.shape, float)),
         demonstration=shown,
     )
-
-
-def hinge_keypoints(
-    angles: Float[np.ndarray, "t 20"],
-    position: Float[np.ndarray, "t 3"],
-    quaternion: Float[np.ndarray, "t 4"],
-    rigid: RigidHand,
-) -> Float[np.ndarray, "t 21 3"]:
-    """The keypoints (m, world) of a rigid hand at hinge angles (rad) and wrist poses (m, wxyz)."""
-    links = forward_kinematics(jnp.asarray(angles, jnp.float32), rigid)
-    points = np.asarray(hand_keypoints(links[1], tip_positions(*links, rigid)), float)
-    return np.einsum("tij,tkj->tki", quaternion_matrices(quaternion), points) + position[:, None]
 
 
 def _axis(up: Float[np.ndarray, "3"]) -> str:

@@ -16,13 +16,13 @@ from jaxtyping import Float
 from envs.grip_force import grip_force_of
 from envs.scene import NUM_WRIST
 from mjx_hand.hand.joints import FINGERS, FLEXES, LINKS, NUM_HINGES
+from mjx_hand.player.steadying import steadied
 from mjx_hand.rigid.gains import Gains
 
 NEAR = 0.008  # m: a phalanx that is closer to the object is taken to touch
 _SAFETY = 8.0  # times the force that just holds the object's weight by friction between thumb and fingers
 _LEAST = 2.0  # N
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
-_STEADY = 0.8  # s: of the low-pass of a holding hand's fingers, whose trembling would shake out what they hold
 _SOON = 0.15  # s over which a grip is taken up and let go: a finger that comes near does not snap shut
 _WRAP_TORQUE = 0.75  # of their torque limits, with which flexing joints close around an object
 # Fingers besides the thumb that are near with two phalanges where a hand begins to wrap, and phalanges when it ends.
@@ -57,10 +57,13 @@ class Grip:
         self._links = {model.body(name).id: k for k, name in enumerate(LINKS)}
         self._force = max(_LEAST, grip_force_of(mass, friction, _SAFETY / 2))
         self._jacobian = np.zeros((3, model.nv))
+        self.reset()
+
+    def reset(self) -> None:
+        """The hand is elsewhere: nothing is held."""
         self._offsets = np.zeros(NUM_HINGES)
         self._wraps = self._holds = False
-        self._steady = np.zeros(NUM_HINGES)
-        self._behind = np.zeros(NUM_HINGES)
+        self._steady = self._tracked = np.zeros(NUM_HINGES)
 
     def pressing(self, angles: Float[np.ndarray, "20"], data: mujoco.MjData, seconds: float) -> Float[np.ndarray, "20"]:
         """What to tell the hinges (rad) in place of where the fingers are tracked.
@@ -71,11 +74,8 @@ class Grip:
             seconds: since the last call.
         """
         pressed = self._pressed(data, seconds)
-        if self._holds:
-            self._steady += min(1.0, seconds / _STEADY) * (angles - self._steady)
-        else:  # what the low-pass is behind by is made up for, not jumped
-            self._steady = angles + (1.0 - min(1.0, seconds / _SOON)) * self._behind
-        self._behind = self._steady - angles
+        self._steady = steadied(self._steady, self._tracked, angles, self._holds, seconds, np)
+        self._tracked = angles
         return self._steady + pressed
 
     def _pressed(self, data: mujoco.MjData, seconds: float) -> Float[np.ndarray, "20"]:

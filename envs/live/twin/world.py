@@ -1,11 +1,14 @@
 """`World`: the twin's hand with an object on a table, in MuJoCo's C engine; JAX has no part in it."""
 
+from typing import Literal
+
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
 from envs.live.twin.contacts import Touch, touches
 from envs.live.twin.grip import Grip, notice_near
+from envs.live.twin.policy_assist import PolicyAssist
 from envs.live.twin.pose import HandPose
 from envs.live.twin.tabletop import Tabletop
 from envs.live.twin.wrist import Wrist
@@ -13,10 +16,13 @@ from envs.physics.native import DIVERGED
 from envs.physics.solver import gauss_seidel
 from envs.scene import NUM_WRIST, OBJECT, scene_spec
 from mjx_hand.hand.joints import LINKS, NUM_HINGES, PARENTS
+from mjx_hand.player.exported_policy import ExportedPolicy
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand
 
-ASSISTS = ("off", "grip")
+OFF: Literal["off"] = "off"  # fingers as they are tracked
+GRIP: Literal["grip"] = "grip"  # pressing what they touch
+Assist = Literal["off", "grip"] | ExportedPolicy  # a live policy moves them
 _HAND = NUM_WRIST + NUM_HINGES
 
 
@@ -27,16 +33,17 @@ class World:
         rigid: the person's hand.
         table: the object and where it stands.
         start: where the hand is at first.
-        assist: one of `ASSISTS`: fingers as they are tracked, or pressing what they touch.
+        assist: what helps the fingers: `OFF`, `GRIP`, or a policy (`envs.live.assistance`).
 
     Attributes:
         model, data: MuJoCo's.
         timestep: s.
     """
 
-    def __init__(self, rigid: RigidHand, table: Tabletop, start: HandPose, assist: str = "off"):
+    def __init__(self, rigid: RigidHand, table: Tabletop, start: HandPose, assist: Assist = OFF):
         gains = Gains()
-        spec = scene_spec(rigid, table.object, table.support, table.support_position, np.eye(3), gains=gains)
+        told = rigid, table.object, table.support, table.support_position, np.eye(3)
+        spec = scene_spec(*told, gains=gains, forces=isinstance(assist, ExportedPolicy))
         (self.model,) = gauss_seidel([spec.compile()])
         self.data = mujoco.MjData(self.model)
         self.timestep = float(self.model.opt.timestep)
@@ -45,11 +52,13 @@ class World:
         self._object_start = table.pose
         self._low, self._high = self.model.actuator_ctrlrange[:_HAND].T
         self._wrist = Wrist(self.model, self.data)
-        self._grip: Grip | None = None
-        if assist == "grip":
+        self._helper: Grip | PolicyAssist | None = None
+        if isinstance(assist, ExportedPolicy):
+            self._helper = PolicyAssist(self.model, self._wrist, table.object, assist)
+        elif assist == GRIP:
             body = int(self._bodies[-1])
             notice_near(self.model, body)
-            self._grip = Grip(self.model, body, float(table.object.mass), float(table.object.friction), gains)
+            self._helper = Grip(self.model, body, float(table.object.mass), float(table.object.friction), gains)
         self.reset(start)
 
     def reset(self, hand: HandPose) -> None:
@@ -58,6 +67,8 @@ class World:
         self._wrist.place(hand.position, hand.quaternion)
         self.data.qpos[NUM_WRIST:_HAND] = hand.angles
         self.put_object_back()
+        if self._helper is not None:
+            self._helper.reset()
         mujoco.mj_kinematics(self.model, self.data)
 
     def put_object_back(self) -> None:
@@ -69,8 +80,8 @@ class World:
         """One physics step towards a target; False if it diverged: all is at rest then, the hand at the target."""
         self._wrist.keep_regular()
         angles = target.angles
-        if self._grip is not None:
-            angles = self._grip.pressing(angles, self.data, self.timestep)
+        if self._helper is not None:
+            angles = self._helper.pressing(angles, self.data, self.timestep)
         wanted = np.concatenate([self._wrist.coordinates(target.position, target.quaternion), angles])
         self.data.ctrl[:] = np.clip(wanted, self._low, self._high)
         mujoco.mj_step(self.model, self.data)

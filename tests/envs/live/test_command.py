@@ -13,7 +13,7 @@ import pytest
 from websockets.sync.client import connect
 
 from envs.live.command import main
-from envs.live.sources.recorded import hinge_keypoints
+from envs.live.twin.hinge_keypoints import hinge_keypoints
 from envs.live.twin.person import SECONDS
 from envs.live.twin.tracker import Tracker
 from mjx_hand.capture.keypoints.recording import KeypointRecording, save_keypoints

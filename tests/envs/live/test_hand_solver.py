@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from envs.live.sources.recorded import hinge_keypoints
 from envs.live.twin.hand_solver import HandSolver
+from envs.live.twin.hinge_keypoints import hinge_keypoints
 from mjx_hand.hand.load import load_hand
 from mjx_hand.rigid.build import build_rigid_hand
 from mjx_hand.rigid.rigid_hand import RigidHand

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from envs.live.sources.messages import LONGEST, Messages
-from envs.live.sources.recorded import hinge_keypoints
+from envs.live.twin.hinge_keypoints import hinge_keypoints
 from mjx_hand.capture.keypoints.layouts import LAYOUTS, from_keypoints
 from mjx_hand.capture.keypoints.skeleton import rest_keypoints
 from mjx_hand.errors import InputError

@@ -16,7 +16,7 @@ from websockets.sync.client import connect
 
 from envs.live.session import Session, serving
 from envs.live.sources.mailbox import Mailbox
-from envs.live.sources.recorded import hinge_keypoints
+from envs.live.twin.hinge_keypoints import hinge_keypoints
 from envs.live.twin.tabletop import tabletop
 from mjx_hand.capture.keypoints.layouts import LAYOUTS, from_keypoints
 from mjx_hand.hand.joints import LINKS

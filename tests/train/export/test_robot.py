@@ -179,7 +179,7 @@ def test_a_hand_with_ties_is_played_too(little: Config, tmp_path: Path):
 def test_fingers_that_slide_are_in_metres(exported: Path, allegro: Config, tmp_path: Path):
     body = named_body(str(write(tmp_path, lambda text: text.replace("'ring_two'", "'ring_two' type='slide'", 1))))
     policy = load_exported_policy(exported / "policy.npz")
-    contract = make_contract(policy, load_checkpoint(f"{allegro.out}/best.npz"), allegro.task, body, 0.0, [])
+    contract = make_contract(policy, load_checkpoint(f"{allegro.out}/best.npz"), allegro.task, body, 0.0, [], "right")
     units = dict(zip(body.names.targets, contract["outputs"][1]["unit"], strict=True))
     assert [name for name, unit in units.items() if unit == "m"] == ["wrist_x", "wrist_y", "wrist_z", "ring_two"]
     inputs = {entry["name"]: entry for entry in contract["inputs"]}

@@ -19,9 +19,9 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.live.flow.timing import STAGES, Timing
-from envs.live.sources.recorded import hinge_keypoints
 from envs.live.twin.follower import Follower
 from envs.live.twin.hand_solver import HandSolver
+from envs.live.twin.hinge_keypoints import hinge_keypoints
 from envs.live.twin.placement import place_hand
 from envs.live.twin.pose import HandPose
 from envs.live.twin.tabletop import tabletop

@@ -1,0 +1,175 @@
+"""`PolicyAssist`: fingers that a trained policy moves beside their tracked way, so that they hold what they reach for.
+
+The policy is one of `task.live`: it sees the twin's hand, where its fingers are tracked, what they press, and the
+object from the wrist, as `envs.observation` tells it in training, and gives residuals of the hinges.
+"""
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from envs.live.twin.wrist import Wrist
+from envs.scene import NUM_WRIST, OBJECT
+from mjx_hand.errors import InputError
+from mjx_hand.hand.joints import FINGERS, NUM_HINGES
+from mjx_hand.objects.description import OBJECT_KINDS, ObjectDescription, object_features
+from mjx_hand.player.contact_force import contact_columns
+from mjx_hand.player.exported_policy import ExportedPolicy
+from mjx_hand.player.features import Feature, feature_table
+from mjx_hand.player.observed_state import HUMAN_NAMES, ObservedState
+from mjx_hand.player.steadying import holding, steadied
+
+_OPENS = 0.02  # m: a finger whose tracked tip goes so much away from the object lets go
+_CLOSES = 0.01  # m: one that comes so much nearer again presses again
+_SOON = 0.15  # s over which it does
+_HAND = NUM_WRIST + NUM_HINGES
+_OF_FINGER = NUM_HINGES // len(FINGERS)
+
+
+def check_live(policy: ExportedPolicy, name: str, side: str) -> ExportedPolicy:
+    """Return a policy if it can help a teleoperated hand.
+
+    Args:
+        policy: as exported.
+        name: what messages call it.
+        side: of the hand.
+
+    Raises:
+        InputError: it follows demonstrations, is of another hand, or sees what this version of mjx-hand does not know.
+    """
+    contract = policy.contract
+    if not contract.get("live", False):
+        raise InputError(
+            f"{name}: a policy that follows demonstrations; a live hand needs one that was trained with "
+            "task.live=true, such as config=live, and exported to npz"
+        )
+    if policy.residual_scale.size != _HAND:
+        raise InputError(
+            f"{name}: moves {policy.residual_scale.size} joints; a person's hand with its wrist has {_HAND}"
+        )
+    if contract.get("side") != side:
+        raise InputError(
+            f"{name}: was trained on {contract.get('side')} hands, and the hand is a {side} one; train one with "
+            f"config=live data.side={side}, or use --assist grip"
+        )
+    known = {feature.name: feature.size for feature in _table(policy) if not feature.of_demonstration}
+    read = {entry["name"]: entry["size"] for entry in contract["inputs"]}
+    if contract["object_kinds"] != [*OBJECT_KINDS] or read.items() - known.items():
+        raise InputError(f"{name}: sees what this version of mjx-hand does not know; train and export it again")
+    if sum(read.values()) != policy.offset.size:
+        raise InputError(f"{name}: its contract does not list its {policy.offset.size} features; export it again")
+    return policy
+
+
+def _table(policy: ExportedPolicy) -> tuple[Feature, ...]:
+    return feature_table(policy.residual_scale, policy.contract["lookahead"], OBJECT_KINDS)
+
+
+class PolicyAssist:
+    """Residuals for one hand and one object.
+
+    Args:
+        model: of a live world, with sensors of what links do to the object.
+        wrist: of that world.
+        description: of the object.
+        policy: see `check_live`.
+    """
+
+    def __init__(self, model: mujoco.MjModel, wrist: Wrist, description: ObjectDescription, policy: ExportedPolicy):
+        self._model, self._wrist, self._policy = model, wrist, policy
+        table, contract = {feature.name: feature for feature in _table(policy)}, policy.contract
+        self._features = [table[entry["name"]] for entry in contract["inputs"]]
+        self._seconds = 1 / float(contract["rate"]["control_hz"])
+        self._object = object_features(description)
+        self._tips = [model.site(f"{finger}_tip").id for finger in HUMAN_NAMES.fingers]
+        self._forces = contact_columns(model)[:, :3]
+        self._bodies = model.body("wrist").id, model.body(OBJECT).id
+        self._tracked = mujoco.MjData(model)
+        self.reset()
+
+    def reset(self) -> None:
+        """The hand is elsewhere: nothing is held."""
+        self._residual = np.zeros(_HAND, np.float32)
+        self._commanded: np.ndarray | None = None
+        self._object_in_hand = np.zeros(3)
+        self._turning = np.full(len(FINGERS), np.inf)
+        self._open = np.zeros(len(FINGERS), bool)
+        self._share = np.ones(len(FINGERS))
+        self._due = 0.0
+
+    def pressing(self, angles: Float[np.ndarray, "20"], data: mujoco.MjData, seconds: float) -> Float[np.ndarray, "20"]:
+        """What to tell the hinges (rad) in place of where the fingers are tracked.
+
+        Args:
+            angles: as tracked.
+            data: as the last step left it.
+            seconds: since the last call.
+        """
+        if self._commanded is None:
+            self._commanded = self._last = angles
+        if self._due <= 0:
+            mujoco.mj_kinematics(self._model, data)  # places follow the state; mj_step leaves them a step behind
+            holds = bool(holding(data.sensordata[self._forces], np))
+            self._let_go(angles, data, holds)
+            seen = self._seen(self._commanded, data)
+            features = np.concatenate([np.ravel(feature.value(seen)) for feature in self._features])
+            _, self._residual = self._policy.step(features)
+            # Fingers that their owner opens are followed, whatever they still touch.
+            steady = holds & ~np.repeat(self._open, _OF_FINGER)
+            told = self._commanded, self._last, angles, steady, self._seconds
+            self._commanded, self._last = steadied(*told, np), angles
+            self._due += self._seconds
+        self._due -= seconds
+        return self._commanded + self._applied[NUM_WRIST:]
+
+    @property
+    def _applied(self) -> Float[np.ndarray, "26"]:
+        return self._residual * np.concatenate([np.zeros(NUM_WRIST), np.repeat(self._share, _OF_FINGER)])
+
+    def _let_go(self, angles: Float[np.ndarray, "20"], data: mujoco.MjData, holds: bool) -> None:
+        """Fade the residuals of fingers that their owner opens, and take them up again where they are closed.
+
+        What counts is how far a tracked tip, which trackers see well, is from where in the hand the object was taken;
+        a thumb's joints tremble by more than it opens, and an object that slips is no finger that opens.
+        """
+        self._tracked.qpos[:] = data.qpos
+        self._tracked.qpos[NUM_WRIST:_HAND] = angles
+        mujoco.mj_kinematics(self._model, self._tracked)
+        wrist, axes = data.xpos[self._bodies[0]], data.xmat[self._bodies[0]].reshape(3, 3)
+        if not holds:
+            self._object_in_hand = (data.qpos[_HAND : _HAND + 3] - wrist) @ axes
+        tips = (self._tracked.site_xpos[self._tips] - wrist) @ axes
+        away = np.linalg.norm(tips - self._object_in_hand, axis=1)
+        # `_turning` is how near a finger was at most since it closed, or how far since it opened.
+        self._turning = np.where(self._open, np.maximum(self._turning, away), np.minimum(self._turning, away))
+        turned = np.where(self._open, away < self._turning - _CLOSES, away > self._turning + _OPENS)
+        self._open ^= turned
+        self._turning = np.where(turned, away, self._turning)
+        step = min(1.0, self._seconds / _SOON)
+        self._share += step * (np.where(self._open, 0.0, 1.0) - self._share)
+
+    def _seen(self, commanded: Float[np.ndarray, "20"], data: mujoco.MjData) -> ObservedState:
+        """What the policy may see of hinges that were told so without it; what only demonstrations tell is none."""
+        wrist, thing = self._bodies
+        return ObservedState(
+            hand=data.qpos[:_HAND],
+            hand_speed=data.qvel[:_HAND],
+            residual=self._applied,
+            object_pose=data.qpos[_HAND:],
+            object_speed=data.qvel[_HAND:],
+            object_turn=None,
+            object_axes=data.xmat[thing].reshape(3, 3),
+            wrist_place=data.xpos[wrist],
+            wrist_axes=data.xmat[wrist].reshape(3, 3),
+            tips=data.site_xpos[self._tips],
+            forces=data.sensordata[self._forces],
+            base=self._wrist.base,
+            target=np.concatenate([data.qpos[:NUM_WRIST], commanded]),
+            grip=None,
+            pose=None,
+            first_pose=None,
+            targets_ahead=None,
+            poses_ahead=None,
+            phase=None,
+            object_features=self._object,
+        )
