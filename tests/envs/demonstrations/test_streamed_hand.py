@@ -1,12 +1,20 @@
 """A demonstration that is streamed is the same act, late, with a tracker's trembling."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from envs.demonstrations.dataset import make_set
+from envs.demonstrations.load_set import PARTS, load_part
+from envs.demonstrations.quality import check_streamed
+from envs.demonstrations.set_settings import SetSettings, set_folder
 from envs.demonstrations.streamed_hand import LATE, streamed_demonstration
+from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import load_demonstration, save_demonstration
 from mjx_hand.motion.mirror import mirrored_demonstration
+from tests.envs.conftest import SETTINGS
 
 
 @pytest.fixture(scope="module")
@@ -50,3 +58,24 @@ def test_a_file_keeps_it_and_two_mirrors_undo_each_other(tmp_path, streamed):
     assert mirrored.tracked is not None
     assert np.sign(mirrored.tracked[0, 0]) == -np.sign(streamed.tracked[0, 0])
     np.testing.assert_array_equal(mirrored_demonstration(mirrored).tracked, streamed.tracked)
+
+
+def test_a_streamed_set_is_the_recorded_one_with_what_trackers_of_their_own_saw(set_root, set_path, capsys):
+    settings = dataclasses.replace(SETTINGS, streamed=True)
+    folder = make_set(settings, set_root)
+    assert folder not in (set_path, set_folder(dataclasses.replace(settings, seed=4), set_root))
+    for part in PARTS:
+        for recorded, seen in zip(load_part(set_path, part), load_part(folder, part), strict=True):
+            assert recorded.tracked is None
+            assert seen.tracked is not None
+            np.testing.assert_array_equal(seen.motion.angles[0], recorded.motion.angles[0])
+    quality = check_streamed(folder, "train")
+    assert len(quality.seconds) == 2
+    assert np.all(quality.wrist_error < 5e-3)
+    with pytest.raises(InputError, match="not streamed"):
+        check_streamed(set_path, "train")
+
+
+def test_recordings_and_given_folders_are_not_streamed():
+    with pytest.raises(InputError, match=r"data\.streamed is true"):
+        SetSettings("given", folder="x", streamed=True)

@@ -63,7 +63,7 @@ def report(options: Options) -> list[str]:
     if len(sides) > 1:
         raise InputError("--sets are of right hands and of left ones; give those of one side")
     side = sides.pop()
-    assists = [assistance(name, side, options.policy if name == POLICY else None) for name in ASSISTS]
+    assists: list[Assist] = [assistance(name, side, options.policy if name == POLICY else None) for name in ASSISTS]
     every = []
     for shown in sets:
         results = [[streamed(d, assist, _SEED + seed) for assist in assists] for seed, d in enumerate(shown)]
