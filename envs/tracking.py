@@ -191,8 +191,7 @@ class TrackingEnv(Env):
         twin = twin_of(state)
         task, progress = self.task, state.info["progress"]
         action = jnp.clip(action, -1.0, 1.0)
-        frame, residual, targets = self.command(twin, action)
-        commanded = None if twin.commanded is None else next_command(self.reference, twin, frame, self.dt)
+        frame, residual, targets, commanded = self.command(twin, action)
         episode, tables, force = twin.episode, self.tables.disturbances, None
         if self.assisted:
             force = self._assistance(twin, frame, progress)
@@ -224,15 +223,18 @@ class TrackingEnv(Env):
 
     def command(
         self, twin: Twin, action: Float[Array, "u"]
-    ) -> tuple[Int[Array, ""], Float[Array, "u"], Float[Array, "u"]]:
-        """The next frame, the residual there, and what the actuators are told on the way (m, rad)."""
+    ) -> tuple[Int[Array, ""], Float[Array, "u"], Float[Array, "u"], Float[Array, "u"] | None]:
+        """The next frame, the residual there, what the actuators are told on the way (m, rad), and, of a teleoperated
+        hand alone, the same without the residual."""
         task = self.task
         residual = task.smoothing * twin.residual + (1 - task.smoothing) * self._scale * action
         frame = jnp.minimum(twin.frame + 1, self.reference.length[twin.demonstration] - 1)
-        target = next_command(self.reference, twin, frame, self.dt) + residual
+        commanded = next_command(self.reference, twin, frame, self.dt)
+        target = commanded + residual
         if twin.episode is not None:
             target = target + followed_target(self.reference, twin.demonstration, frame, twin.episode.displacement)
-        return frame, residual, jnp.clip(target, self.tables.low, self.tables.high)
+        targets = jnp.clip(target, self.tables.low, self.tables.high)
+        return frame, residual, targets, None if twin.commanded is None else commanded
 
     def _assistance(self, twin: Twin, frame: Int[Array, ""], progress: Float[Array, ""]) -> Float[Array, "6"]:
         """The virtual object controller's force (N, world) and torque (N m, the object's axes)."""

@@ -85,7 +85,7 @@ def check_streamed(folder: str | Path, part: str) -> Tracking:
     """Read one part of a streamed set back.
 
     Raises:
-        InputError: a file is missing or damaged, or none looked on.
+        InputError: a file is missing or damaged, or no tracker saw a demonstration.
     """
     rows = []
     for k, d in enumerate(load_part(folder, part)):

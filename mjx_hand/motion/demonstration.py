@@ -40,7 +40,7 @@ class Demonstration:
         hinge_axis, rest_rotation: of the twin's hinges, as in `RigidHand`, where the angles belong to others than those
             that the shape's hand is built with; else None.
         tracked: where a live tracker had the hand, late and with noise, while it moved as `motion` says: wrist position
-            and quaternion and hinge angles; None where none looked on.
+            (m), quaternion (wxyz) and hinge angles (rad) in one row; None where there was none.
         grasp: name of the grasp type.
         source: provenance, one line.
     """

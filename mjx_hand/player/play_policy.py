@@ -12,7 +12,8 @@ from mjx_hand.errors import InputError
 from mjx_hand.player.approach import approach_weights, displacement, followed
 from mjx_hand.player.contact_force import contact_columns
 from mjx_hand.player.exported_policy import ExportedPolicy, load_exported_policy
-from mjx_hand.player.features import CONTACT_FORCES, Feature, feature_table
+from mjx_hand.player.features import CONTACT_FORCES
+from mjx_hand.player.features_read import features_read
 from mjx_hand.player.observed_state import WRIST, HandNames, ObservedState
 from mjx_hand.player.tracking_reference import TrackingReference, load_tracking_reference
 
@@ -96,7 +97,8 @@ class Player:
         names = _hand(policy)
         self.model = _scene(folder / reference.scene, names)
         self.data = mujoco.MjData(self.model)
-        self._features = _features(policy, reference, names)
+        self._features = features_read(policy, names)
+        _check_object(policy, reference)
         self._tips = [self.model.site(f"{finger}_tip").id for finger in names.fingers]
         self._forces = contact_columns(self.model)[:, :3]
         self._wrist, self._object = self.model.body("wrist").id, self.model.body("object").id
@@ -172,31 +174,13 @@ def _turn(a: Float[np.ndarray, "4"], b: Float[np.ndarray, "4"]) -> Float[np.ndar
     return turn
 
 
-def _features(policy: ExportedPolicy, reference: TrackingReference, hand: HandNames) -> list[Feature]:
-    """The features that the policy reads, in its order."""
-    known = {
-        feature.name: feature
-        for feature in feature_table(
-            policy.residual_scale, policy.contract["lookahead"], policy.contract["object_kinds"], hand
-        )
-    }
-    inputs = policy.contract["inputs"]
-    for entry in inputs:
-        name, size = entry["name"], entry["size"]
-        if name not in known or known[name].size != size:
-            raise InputError(
-                f"the policy reads {name!r} ({size} numbers), which this version of mjx-hand does not have; "
-                "export the policy again with this version"
-            )
-    if sum(entry["size"] for entry in inputs) != policy.offset.size:
-        raise InputError(f"the policy's contract does not list its {policy.offset.size} features; export it again")
-    kinds = len(policy.contract["object_kinds"])
-    if reference.object_features.size != 5 + kinds:
+def _check_object(policy: ExportedPolicy, reference: TrackingReference) -> None:
+    read = 5 + len(policy.contract["object_kinds"])
+    if reference.object_features.size != read:
         raise InputError(
-            f"the reference has {reference.object_features.size} features of the object, the policy reads {5 + kinds}; "
+            f"the reference has {reference.object_features.size} features of the object, the policy reads {read}; "
             "export both together"
         )
-    return [known[entry["name"]] for entry in inputs]
 
 
 def _hand(policy: ExportedPolicy) -> HandNames:

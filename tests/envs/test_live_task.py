@@ -103,7 +103,7 @@ def test_it_sees_the_same_wherever_the_hand_is_and_faces(live):
 
 def test_the_wrist_is_the_persons(live):
     state = jax.jit(live.start)(jnp.asarray(0), jnp.asarray(0))
-    frame, residual, targets = live.command(state.pipeline_state, jnp.ones(26))
+    frame, residual, targets, _ = live.command(state.pipeline_state, jnp.ones(26))
     assert not np.any(np.asarray(residual[:6]))
     np.testing.assert_array_equal(targets[:6], live.reference.controls[0, frame, :6])
     np.testing.assert_allclose(targets[6:] - residual[6:], live.reference.controls[0, frame, 6:], atol=1e-6)

@@ -15,13 +15,13 @@ from mjx_hand.hand.joints import FINGERS, NUM_HINGES
 from mjx_hand.objects.description import OBJECT_KINDS, ObjectDescription, object_features
 from mjx_hand.player.contact_force import contact_columns
 from mjx_hand.player.exported_policy import ExportedPolicy
-from mjx_hand.player.features import Feature, feature_table
+from mjx_hand.player.features_read import features_read
 from mjx_hand.player.observed_state import HUMAN_NAMES, ObservedState
 from mjx_hand.player.steadying import holding, steadied
 
 _OPENS = 0.02  # m: a finger whose tracked tip goes so much away from the object lets go
 _CLOSES = 0.01  # m: one that comes so much nearer again presses again
-_SOON = 0.15  # s over which it does
+_SOON = 0.15  # s over which it does the one or the other
 _HAND = NUM_WRIST + NUM_HINGES
 _OF_FINGER = NUM_HINGES // len(FINGERS)
 
@@ -52,17 +52,10 @@ def check_live(policy: ExportedPolicy, name: str, side: str) -> ExportedPolicy:
             f"{name}: was trained on {contract.get('side')} hands, and the hand is a {side} one; train one with "
             f"config=live data.side={side}, or use --assist grip"
         )
-    known = {feature.name: feature.size for feature in _table(policy) if not feature.of_demonstration}
-    read = {entry["name"]: entry["size"] for entry in contract["inputs"]}
-    if contract["object_kinds"] != [*OBJECT_KINDS] or read.items() - known.items():
-        raise InputError(f"{name}: sees what this version of mjx-hand does not know; train and export it again")
-    if sum(read.values()) != policy.offset.size:
-        raise InputError(f"{name}: its contract does not list its {policy.offset.size} features; export it again")
+    if contract["object_kinds"] != [*OBJECT_KINDS]:
+        raise InputError(f"{name}: sees kinds of objects that this version of mjx-hand does not know; train it again")
+    features_read(policy, name=name, live=True)
     return policy
-
-
-def _table(policy: ExportedPolicy) -> tuple[Feature, ...]:
-    return feature_table(policy.residual_scale, policy.contract["lookahead"], OBJECT_KINDS)
 
 
 class PolicyAssist:
@@ -77,9 +70,8 @@ class PolicyAssist:
 
     def __init__(self, model: mujoco.MjModel, wrist: Wrist, description: ObjectDescription, policy: ExportedPolicy):
         self._model, self._wrist, self._policy = model, wrist, policy
-        table, contract = {feature.name: feature for feature in _table(policy)}, policy.contract
-        self._features = [table[entry["name"]] for entry in contract["inputs"]]
-        self._seconds = 1 / float(contract["rate"]["control_hz"])
+        self._features = features_read(policy)
+        self._seconds = 1 / float(policy.contract["rate"]["control_hz"])
         self._object = object_features(description)
         self._tips = [model.site(f"{finger}_tip").id for finger in HUMAN_NAMES.fingers]
         self._forces = contact_columns(model)[:, :3]
@@ -90,7 +82,8 @@ class PolicyAssist:
     def reset(self) -> None:
         """The hand is elsewhere: nothing is held."""
         self._residual = np.zeros(_HAND, np.float32)
-        self._commanded: np.ndarray | None = None
+        self._commanded: np.ndarray | None = None  # and when that was, what was tracked
+        self._last = np.zeros(NUM_HINGES)
         self._object_in_hand = np.zeros(3)
         self._turning = np.full(len(FINGERS), np.inf)
         self._open = np.zeros(len(FINGERS), bool)

@@ -100,7 +100,7 @@ def test_it_sees_and_does_what_it_saw_and_did_in_training(live):
 
     observed = np.asarray(state.obs, np.float32)
     action = np.clip(observed @ policy.layers[0].kernel, -1, 1)
-    _, residual, targets = live.command(twin, jnp.asarray(action))
+    _, residual, targets, _ = live.command(twin, jnp.asarray(action))
     np.testing.assert_allclose(told - commanded, np.asarray(residual)[6:], atol=1e-3)
     low, high = np.asarray(live.tables.low)[6:], np.asarray(live.tables.high)[6:]
     np.testing.assert_allclose(np.clip(told, low, high), np.asarray(targets)[6:], atol=1e-3)
