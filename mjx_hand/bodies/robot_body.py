@@ -14,6 +14,7 @@ from mjx_hand.rigid.gains import Gains
 from mjx_hand.robots.hand_axes import check_directions, hand_axes
 from mjx_hand.robots.model.gains import ruled_gains
 from mjx_hand.robots.model.links import HandLinks, hand_links
+from mjx_hand.robots.model.shapes import AbsentMeshError
 from mjx_hand.robots.model.spec import WRIST, RobotModel, add_actuators, bare_spec, geom_name, model_links
 from mjx_hand.robots.robot_hand import RobotHand, load_robot, urdf_of
 
@@ -45,9 +46,13 @@ def robot_model(
     hand = hand_links(description, urdf)
     side = _side(description, urdf)
     tips = {_finger(keypoint): link for link, keypoint in description.tips.items()}
+    try:
+        links = model_links(hand, collision, absent)
+    except AbsentMeshError as error:
+        raise InputError(f"{error}{'' if description.place is None else description.place.others()}") from None
     robot = RobotModel(
         name=description.name,
-        links=model_links(hand, collision, absent),
+        links=links,
         mount=_mount(description, hand, side),
         tips={finger: tips[finger] for finger in FINGERS if finger in tips},
         notes=hand.notes,

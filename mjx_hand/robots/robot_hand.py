@@ -5,7 +5,6 @@ file serves as well. The URDF is the user's own.
 """
 
 from dataclasses import dataclass, field
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ import numpy as np
 from mjx_hand.capture.keypoints.layouts import KEYPOINTS
 from mjx_hand.errors import InputError
 from mjx_hand.files.safe_yaml import read_yaml, shown
-from mjx_hand.robots.robot_file import check_mjcf
+from mjx_hand.robots.model_place import ModelPlace, model_place
 from mjx_hand.robots.robot_urdf import robot_tree
 from mjx_hand.robots.solver.kinematic_tree import BASE, KinematicTree
 from mjx_hand.robots.solver.objectives import KINDS, Objective, dexpilot_pairs
@@ -37,7 +36,7 @@ class RobotHand:
         joints: further links and their keypoints.
         all_vectors: whether the objective `vector` follows `joints` too, not only `tips`.
         scaling: the robot's size over a person's.
-        urdf: its file, where the description says one; a URDF, or an MJCF where it calls it so.
+        place: where its file is, where the description says so; a URDF, or an MJCF where it calls it so.
         force_limits, stiffness: of single joints (N m, N m/rad; of sliding ones N, N/m), in the place of what
             `robots.model.gains` would have.
         fingers, palmar: directions in the frame of the URDF's root link, unit and at right angles: where straight
@@ -52,7 +51,7 @@ class RobotHand:
     scaling: float
     fingers: np.ndarray
     palmar: np.ndarray
-    urdf: Path | None = None
+    place: ModelPlace | None = None
     force_limits: dict[str, float] = field(default_factory=dict)
     stiffness: dict[str, float] = field(default_factory=dict)
 
@@ -109,32 +108,10 @@ def _checked(path: Path, content: Any) -> RobotHand:
         scaling=float(scaling),
         fingers=fingers,
         palmar=palmar,
-        urdf=_model_file(path, content),
+        place=model_place(path, content),
         force_limits=_by_joint(path, "force_limits", content.get("force_limits", {})),
         stiffness=_by_joint(path, "stiffness", content.get("stiffness", {})),
     )
-
-
-def _model_file(path: Path, content: dict[str, Any]) -> Path | None:
-    """Where a description's URDF or MJCF is: beside it, or with `PACKAGE:PATH` in an installed Python package."""
-    given = [name for name in ("urdf", "mjcf") if content.get(name) is not None]
-    if not given:
-        return None
-    if len(given) > 1:
-        raise InputError(f"{path}: has urdf and mjcf; give one of them")
-    value = content[given[0]]
-    if not isinstance(value, str) or not value:
-        raise InputError(f"{path}: {given[0]} is {shown(value)}; give a path from this file on, or PACKAGE:PATH")
-    package, found, inside = value.partition(":")
-    if not found:
-        file = path.parent / value
-    else:
-        spec = find_spec(package) if package.isidentifier() else None
-        folder = None if spec is None or spec.origin is None else Path(spec.origin).parent
-        file = Path(value) if folder is None else folder / inside  # which is said to be absent when it is read
-    if given == ["mjcf"] and file.is_file():
-        check_mjcf(file)
-    return file
 
 
 def _by_joint(path: Path, name: str, value: Any) -> dict[str, float]:
@@ -156,17 +133,11 @@ def urdf_of(robot: RobotHand, given: str | Path | None = None) -> Path:
     """
     if given is not None:
         return Path(given)
-    if robot.urdf is None:
+    if robot.place is None:
         raise InputError(
             f"{robot.name}: its description names no URDF; add urdf: FILE or mjcf: FILE to it, or give the file"
         )
-    package, colon, _ = str(robot.urdf).partition(":")
-    if colon and not robot.urdf.is_file():
-        raise InputError(
-            f"{robot.name}: its file comes with the Python package {package}, which is not installed: pip install "
-            f"{package.replace('_', '-')}, or give a URDF of your own"
-        )
-    return robot.urdf
+    return robot.place.found(robot.name)
 
 
 def _direction(path: Path, name: str, value: Any) -> np.ndarray:

@@ -33,13 +33,13 @@ def followed_places(
         for first, end in spans(pads.touching[:, k]):
             inside = first <= pads.grasp < end
             stuck[first:end] = own[pads.grasp] if inside else own[first:end].mean(axis=0)
-        share = _onto(pads.touching[:, k], demonstration.motion.fps)[:, None]
+        share = onto(pads.touching[:, k], demonstration.motion.fps)[:, None]
         off = turn[pads.grasp].inv().apply(place - position[pads.grasp]) - own[pads.grasp]
         wanted[:, k] = position + turn.apply(own + share * (stuck - own) + off)
     return wanted
 
 
-def _onto(touching: Bool[np.ndarray, "t"], fps: float) -> Float[np.ndarray, "t"]:
+def onto(touching: Bool[np.ndarray, "t"], fps: float) -> Float[np.ndarray, "t"]:
     """How much a pad goes with the object, from 0 to 1 and back without a jolt; a demonstration's ends are none."""
     ramp = round(_ONTO * fps) + 1
     inside = np.asarray(distance_transform_edt(np.pad(touching, ramp, mode="edge")))[ramp:-ramp]

@@ -19,6 +19,10 @@ _THICK, _SHORT = 0.008, 0.006  # m: the radius of a capsule along a bone, and a 
 _SAMPLES = 2000  # points of a surface, by which shapes are compared
 
 
+class AbsentMeshError(InputError):
+    """A mesh that a robot's file names is not there."""
+
+
 @dataclass(frozen=True)
 class Shape:
     """A shape in a link's frame (m).
@@ -173,7 +177,7 @@ def _sizes(path: Path, link: str, values: Any) -> Float[np.ndarray, "n"]:
 def _mesh(path: Path, link: str, mesh: Any) -> trimesh.Trimesh:
     file = mesh_file(path, mesh.filename)
     if file is None:
-        raise InputError(
+        raise AbsentMeshError(
             f"{path}: the mesh {shown(str(mesh.filename))} of link {shown(link)} is not there; put it where the URDF "
             "says, beside the file"
         )

@@ -1,0 +1,57 @@
+"""`RobotScene`: a robot hand and a demonstration's object, and what is asked of them."""
+
+import numpy as np
+from jaxtyping import Float
+
+from envs.demonstrations.on_robot.left_out import shared_pads
+from envs.demonstrations.on_robot.pads import demonstrated_pads
+from envs.model_grip import Touch
+from envs.scene import base_rotation, demonstration_spec, wrist_coordinates
+from mjx_hand.bodies.body import Body
+from mjx_hand.bodies.coordinates import coordinates_per_target, hand_coordinates
+from mjx_hand.motion.demonstration import Demonstration
+from mjx_hand.rigid.rigid_hand import RigidHand
+
+CLEAR = 0.001  # m off the object, beyond which a link that does not touch is not inside
+ANYWHERE = 10.0  # m: of every link, also where a step of a search throws the hand far from the object
+
+
+class RobotScene:
+    """One demonstration on its way onto a robot.
+
+    Attributes:
+        pads: where the person's fingers touch, of those that the robot has.
+        base: turn of the wrist's slides.
+        wrist: the person's wrist in them, frame by frame.
+        touch: links and object.
+        low, high, middle: limits of the targets (wrist and actuated joints), and what lies between them.
+        last: each finger's last link, "" the palm's, by its number in `touch`.
+        sites: the finger tips'.
+    """
+
+    def __init__(self, demonstration: Demonstration, person: RigidHand, body: Body):
+        self.demonstration, self.body = demonstration, body
+        self.pads = shared_pads(demonstrated_pads(demonstration, person), body)
+        self.base = base_rotation(demonstration)
+        motion = demonstration.motion
+        self.wrist = wrist_coordinates(motion.wrist_position, motion.wrist_quaternion, self.base)
+        self.model = demonstration_spec(demonstration, body).compile()
+        self.touch = Touch(self.model, body, palm=True)
+        self.count = body.num_targets
+        self.mix = coordinates_per_target(self.model, self.count)
+        self.low, self.high = self.model.actuator_ctrlrange[: self.count].T
+        self.middle = (self.low + self.high) / 2
+        self.last = {finger: k for k, finger in enumerate(self.touch.fingers)}  # each finger's last link
+        self.sites = {finger: self.model.site(f"{finger}_tip").id for finger in body.fingers}
+
+    def place(self, targets: np.ndarray, frame: int) -> None:
+        """Put hand and object where they are in a frame with these targets."""
+        self.touch.place(hand_coordinates(self.model, targets), self.demonstration.object_pose[frame])
+
+    def near(self) -> dict[int, tuple[float, np.ndarray, np.ndarray]]:
+        """Of every link its gap, its point nearest to the object, and the way in, where they are now."""
+        return {number: (gap, point, way) for number, gap, point, way in self.touch.nearest(ANYWHERE)}
+
+    def jacobian(self, link: int, point: np.ndarray) -> Float[np.ndarray, "3 u"]:
+        """How a point (m, world) of a link moves with the targets."""
+        return self.touch.jacobian(link, point) @ self.mix
