@@ -37,6 +37,7 @@ class Touch:
     Attributes:
         links: those of fingers that have a shape to touch with.
         fingers: of each of them, "" of the palm's.
+        object, ground: shapes that are near: the object's, and what stands still, table and support.
     """
 
     def __init__(self, model: mujoco.MjModel, body: Body, *, palm: bool = False):
@@ -48,7 +49,8 @@ class Touch:
         shapes = {geom: _corners(model, geom) for geoms in self._hand for geom in geoms}
         self._corners = {geom: corners for geom, (corners, _) in shapes.items()}
         self._round = {geom: radius for geom, (_, radius) in shapes.items()}
-        self._object = np.flatnonzero(model.geom_bodyid == model.body(OBJECT).id).tolist()
+        self.object: list[int] = np.flatnonzero(model.geom_bodyid == model.body(OBJECT).id).tolist()
+        self.ground: list[int] = np.flatnonzero(model.geom_bodyid == 0).tolist()
 
     def place(self, coordinates: Float[np.ndarray, "m"], object_pose: Float[np.ndarray, "7"]) -> None:
         """Put hand and object somewhere."""
@@ -56,13 +58,19 @@ class Touch:
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
 
-    def nearest(self, most: float = _FAR) -> Iterator[tuple[int, float, np.ndarray, np.ndarray]]:
-        """Of each link that is nearer than `most` (m): its number, the gap, its point there, and the way in (world)."""
+    def nearest(
+        self, most: float = _FAR, others: Sequence[int] | None = None
+    ) -> Iterator[tuple[int, float, np.ndarray, np.ndarray]]:
+        """Of each link that is nearer than `most` (m): its number, the gap, its point there, and the way in (world).
+
+        Nearer to the object, or to these other shapes.
+        """
+        others = self.object if others is None else others
         ends = np.zeros(6)
         for number, geoms in enumerate(self._hand):
             best: tuple[float, np.ndarray, tuple[int, int]] | None = None
             for geom in geoms:
-                for other in self._object:
+                for other in others:
                     gap = mujoco.mj_geomDistance(self.model, self.data, geom, other, most, ends)
                     if gap < most and (best is None or gap < best[0]):
                         best = gap, ends.copy(), (geom, other)

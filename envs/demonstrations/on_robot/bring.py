@@ -7,6 +7,7 @@ other link is inside the object, and the wrist is turned as the person's where t
 as the person's went, from that grasp, and in each frame fingers are where the person's pads were.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.on_robot.closure import closes
 from envs.demonstrations.on_robot.follow import follow
-from envs.demonstrations.on_robot.grasp import ALONG, Grasp, find_grasp
+from envs.demonstrations.on_robot.grasp import ALONG, Grasp, find_grasps
 from envs.demonstrations.on_robot.left_out import NO_CLOSURE, OUT_OF_REACH, LeftOut
 from envs.demonstrations.on_robot.robot_scene import RobotScene
 from envs.scene import NUM_WRIST
@@ -59,31 +60,12 @@ def on_robot(demonstration: Demonstration, person: RigidHand, body: Body) -> Bro
             f"{demonstration.motion.side} hand's description"
         )
     scene = RobotScene(demonstration, person, body)
-    grasp = find_grasp(scene)
-    _check_grasp(scene, grasp)
+    grasp = _first_possible(scene, find_grasps(scene))
     rows = follow(scene, grasp.targets)
     turn = Rotation.from_matrix(scene.base) * Rotation.from_euler("XYZ", rows[:, 3:NUM_WRIST])
     quaternion = turn.as_quat(scalar_first=True)
     made = moved_by(body, demonstration, rows[:, NUM_WRIST:], rows[:, :3] @ scene.base.T, quaternion)
     return Brought(made, scene.pads.fingers, grasp)
-
-
-def _check_grasp(scene: RobotScene, grasp: Grasp) -> None:
-    """Raise LeftOut if it does not touch where the person's does, or could not hold the object."""
-    fingers = scene.pads.fingers
-    name = f"{scene.body.name!r} cannot grasp as demonstrated ({scene.demonstration.grasp})"
-    far = not scene.pads.wraps and (grasp.off.max() > 2 * ALONG + _OFF or grasp.gap.max() > _OFF)
-    if far or grasp.depth > _DEPTH:
-        raise LeftOut(
-            OUT_OF_REACH,
-            f"{name}: its {fingers[int(grasp.off.argmax())]} stays {1e3 * grasp.off.max():.0f} mm from where the "
-            f"person's touches, its links are {1e3 * grasp.depth:.0f} mm inside",
-        )
-    scene.place(grasp.targets, scene.pads.grasp)
-    contacts = [(point, way) for gap, point, way in scene.near().values() if gap < _TOUCHES]
-    points, ways = (np.array([contact[k] for contact in contacts]).reshape(-1, 3) for k in (0, 1))
-    if not closes(points, ways, scene.demonstration.object.friction):
-        raise LeftOut(NO_CLOSURE, f"{name}: no posture of it has force closure, {len(points)} of its links touch")
 
 
 def moved_by(
@@ -105,3 +87,35 @@ def moved_by(
         joint_names=body.joints,
     )
     return replace(demonstration, motion=motion, tracked=None)  # a tracker saw the person's hand
+
+
+def _first_possible(scene: RobotScene, grasps: Sequence[Grasp]) -> Grasp:
+    """The best grasp with which the hand can hold the object; where there is none, LeftOut with the best's reason."""
+    refused = []
+    for grasp in grasps:
+        fault = _fault(scene, grasp)
+        if fault is None:
+            return grasp
+        refused.append(fault)
+    raise refused[0]
+
+
+def _fault(scene: RobotScene, grasp: Grasp) -> LeftOut | None:
+    """Why a grasp does not touch where the person's does, or could not hold the object."""
+    fingers = scene.pads.fingers
+    name = f"{scene.body.name!r} cannot grasp as demonstrated ({scene.demonstration.grasp})"
+    if grasp.sunk > _DEPTH:
+        return LeftOut(OUT_OF_REACH, f"{name}: its links are {1e3 * grasp.sunk:.0f} mm inside table or support")
+    far = not scene.pads.wraps and (grasp.off.max() > 2 * ALONG + _OFF or grasp.gap.max() > _OFF)
+    if far or grasp.depth > _DEPTH:
+        return LeftOut(
+            OUT_OF_REACH,
+            f"{name}: its {fingers[int(grasp.off.argmax())]} stays {1e3 * grasp.off.max():.0f} mm from where the "
+            f"person's touches, its links are {1e3 * grasp.depth:.0f} mm inside",
+        )
+    scene.place(grasp.targets, scene.pads.grasp)
+    contacts = [(point, way) for gap, point, way in scene.near().values() if gap < _TOUCHES]
+    points, ways = (np.array([contact[k] for contact in contacts]).reshape(-1, 3) for k in (0, 1))
+    if closes(points, ways, scene.demonstration.object.friction):
+        return None
+    return LeftOut(NO_CLOSURE, f"{name}: no posture of it has force closure, {len(points)} of its links touch")

@@ -48,6 +48,9 @@ def follow(scene: RobotScene, grasp: Float[np.ndarray, "u"]) -> Float[np.ndarray
                 if gap < clear[at, link]:
                     rows.append((way @ scene.jacobian(link, point))[None] / _INSIDE)
                     values.append(np.array([(clear[at, link] - gap) / _INSIDE]))
+            off_ground, slopes = scene.off_ground(_INSIDE)
+            values += off_ground
+            rows += slopes
             rows += [unit[:NUM_WRIST] / weights[:, None], unit[NUM_WRIST:] / _CHANGE]
             values += [(targets[:NUM_WRIST] - wrist[at]) / weights, (targets - before)[NUM_WRIST:] / _CHANGE]
             return np.concatenate(values), np.concatenate(rows)

@@ -1,12 +1,13 @@
 """One grasp of a robot hand, where and as a person's: damped least squares from several postures."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
 from envs.demonstrations.on_robot.least_squares import solve
-from envs.demonstrations.on_robot.robot_scene import CLEAR, RobotScene
+from envs.demonstrations.on_robot.robot_scene import CLEAR, OFF_GROUND, RobotScene
 from envs.scene import NUM_WRIST
 
 ALONG = 0.004  # m that weighs 1 along the object's surface
@@ -16,6 +17,7 @@ _TIP = 0.05  # m that weighs 1 of a tip that touches nothing
 _SAME_FACE = 0.8  # cosine between the person's way into the object and the robot's
 _ALONG_WRAP, _AROUND = 0.02, 0.01  # m that weigh 1 of a hand that wraps: along the surface, and of further links off it
 _BENT = (0.15, 0.3, 0.45, 0.6)  # of the joints' ranges, at which a search begins
+_IDLE_BENT = (0.3, 0.9)  # of those of fingers that touch nothing
 _STEPS = 60
 
 
@@ -28,16 +30,18 @@ class Grasp:
         off: how far each finger that touches is from where the person's touched (m).
         depth: how deep any link is inside the object (m).
         gap: how far each finger that touches is off the surface (m).
+        sunk: how deep any link is inside table or support, where the object is taken from (m).
     """
 
     targets: Float[np.ndarray, "u"]
     off: Float[np.ndarray, "f"]
     depth: float
     gap: Float[np.ndarray, "f"]
+    sunk: float
 
 
-def find_grasp(scene: RobotScene) -> Grasp:
-    """The best grasp from several beginnings, and how far it is from what is wanted."""
+def find_grasps(scene: RobotScene) -> list[Grasp]:
+    """Grasps from several beginnings, the best first."""
     frame, pads = scene.pads.grasp, scene.pads
     places = pads.surface
     wrist = scene.wrist[frame]
@@ -67,6 +71,9 @@ def find_grasp(scene: RobotScene) -> Grasp:
             elif link in closing:
                 rows.append(-(way @ scene.jacobian(link, point))[None] / _AROUND)
                 values.append(np.array([(gap - CLEAR) / _AROUND]))
+        off_ground, slopes = scene.off_ground(_INSIDE)
+        values += off_ground
+        rows += slopes
         for finger, site in scene.sites.items():
             if finger not in pads.fingers and finger in pads.tips:
                 link = scene.last[finger]
@@ -79,21 +86,27 @@ def find_grasp(scene: RobotScene) -> Grasp:
         values += [(targets - scene.middle)[NUM_WRIST:] / _POSED]
         return np.concatenate(values), np.concatenate(rows)
 
-    best: tuple[float, np.ndarray] | None = None
-    for bent in _BENT:
-        start = scene.low + bent * (scene.high - scene.low)
+    scene.put_ground(frame)
+    found: list[tuple[float, np.ndarray]] = []
+    scene.place(scene.middle, frame)
+    moved = [scene.jacobian(k, scene.touch.data.xpos[scene.model.body(scene.touch.links[k]).id]) for k in wanted]
+    idle = ~np.any(np.abs(moved) > 1e-9, axis=(0, 1))  # what moves no finger that touches
+    for bent, idle_bent in itertools.product(_BENT, _IDLE_BENT if idle.any() else (0.0,)):
+        start = scene.low + np.where(idle, idle_bent, bent) * (scene.high - scene.low)
         start[:NUM_WRIST] = wrist
         scene.place(start, frame)
         tips = np.mean([scene.touch.data.site_xpos[scene.sites[finger]] for finger in pads.fingers], axis=0)
         start[:3] += scene.base.T @ (places.mean(axis=0) - tips)
-        found, cost = solve(equations, start, scene.low, scene.high, _STEPS)
-        if best is None or cost < best[0]:
-            best = cost, found
-    assert best is not None
-    targets = best[1]
-    scene.place(targets, frame)
-    near = scene.near()
-    off = np.array([np.linalg.norm(near[k][1] - place) for k, place in zip(wanted, places, strict=True)])
-    gap = np.array([near[k][0] for k in wanted])
-    depth = max(0.0, -min(rest[0] for rest in near.values()))
-    return Grasp(targets, off, depth, np.maximum(gap, 0.0))
+        targets, cost = solve(equations, start, scene.low, scene.high, _STEPS)
+        found.append((cost, targets))
+    grasps = []
+    for _, targets in sorted(found, key=lambda each: each[0]):
+        scene.place(targets, frame)
+        near = scene.near()
+        off = np.array([np.linalg.norm(near[k][1] - place) for k, place in zip(wanted, places, strict=True)])
+        gap = np.array([near[k][0] for k in wanted])
+        depth = max(0.0, -min(rest[0] for rest in near.values()))
+        sunk = max([0.0, *(-gap for _, gap, _, _ in scene.touch.nearest(OFF_GROUND, scene.touch.ground))])
+        grasps.append(Grasp(targets, off, depth, np.maximum(gap, 0.0), sunk))
+    scene.put_ground(0)
+    return grasps

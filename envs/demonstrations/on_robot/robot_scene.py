@@ -2,6 +2,7 @@
 
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.on_robot.left_out import shared_pads
 from envs.demonstrations.on_robot.pads import demonstrated_pads
@@ -13,6 +14,7 @@ from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.rigid.rigid_hand import RigidHand
 
 CLEAR = 0.001  # m off the object, beyond which a link that does not touch is not inside
+OFF_GROUND = 0.003  # m that links keep off table and support
 ANYWHERE = 10.0  # m: of every link, also where a step of a search throws the hand far from the object
 
 
@@ -42,11 +44,34 @@ class RobotScene:
         self.low, self.high = self.model.actuator_ctrlrange[: self.count].T
         self.middle = (self.low + self.high) / 2
         self.last = {finger: k for k, finger in enumerate(self.touch.fingers)}  # each finger's last link
+        ground = self.touch.ground
+        self._ground = self.model.geom_pos[ground].copy(), self.model.geom_quat[ground].copy()
         self.sites = {finger: self.model.site(f"{finger}_tip").id for finger in body.fingers}
 
     def place(self, targets: np.ndarray, frame: int) -> None:
         """Put hand and object where they are in a frame with these targets."""
         self.touch.place(hand_coordinates(self.model, targets), self.demonstration.object_pose[frame])
+
+    def put_ground(self, frame: int) -> None:
+        """Put table and support where they are to the object of this frame as they are to it at the beginning.
+
+        A grasp is sought where the object is carried, and has to be one that picks it up. Of frame 0 they are where
+        they are.
+        """
+        place, turn = self._ground
+        start, there = self.demonstration.object_pose[0], self.demonstration.object_pose[frame]
+        first, last = (Rotation.from_quat(pose[3:], scalar_first=True) for pose in (start, there))
+        moved = last * first.inv()
+        ground = self.touch.ground
+        self.model.geom_pos[ground] = there[:3] + moved.apply(place - start[:3])
+        turned = moved * Rotation.from_quat(turn, scalar_first=True)
+        self.model.geom_quat[ground] = turned.as_quat(scalar_first=True)
+
+    def off_ground(self, weight: float) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Residuals of links nearer to the ground than they should be, where `weight` (m) is 1, and their slopes."""
+        near = list(self.touch.nearest(OFF_GROUND, self.touch.ground))
+        values = [np.array([(OFF_GROUND - gap) / weight]) for _, gap, _, _ in near]
+        return values, [(way @ self.jacobian(link, point))[None] / weight for link, _, point, way in near]
 
     def near(self) -> dict[int, tuple[float, np.ndarray, np.ndarray]]:
         """Of every link its gap, its point nearest to the object, and the way in, where they are now."""

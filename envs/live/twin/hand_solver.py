@@ -5,9 +5,9 @@ by Levenberg's steps within the hinges' limits. `KeypointStream` does that for a
 a frame follows none; but it compiles for a minute, and its threads would take turns with those of the physics.
 Derivatives here are the C engine's, so that the first frame of a person's hand is as quick as every other.
 
-`on_robot.least_squares.solve` is for residuals over a hand's targets, whose wrist is six more joints. Here the wrist turns
-freely, by a quaternion, the loss is no sum of squares, and a frame has milliseconds: the two share no line but the
-linear solve.
+`on_robot.least_squares.solve` is for residuals over a hand's targets, whose wrist is six more joints. Here the wrist
+turns freely, by a quaternion, the loss is no sum of squares, and a frame has milliseconds: the two share no line but
+the linear solve.
 """
 
 import mujoco
