@@ -1,4 +1,4 @@
-"""Where a description says that a robot's file is: beside it, in a package, or in a folder that the environment names."""
+"""Where a description says that a robot's file is: beside it, in a package, or in a folder of the environment."""
 
 import shutil
 
@@ -65,7 +65,7 @@ def test_a_package_that_is_not_installed_is_named_with_what_else_would_do(folder
 
 
 def test_descriptions_are_found_in_a_folder_of_dex_urdf(monkeypatch, tmp_path):
-    """Its layout, with files of the wheel that carries the same URDFs; meshes that only the folder has are asked for."""
+    """Its layout, with files of the wheel that carries the same URDFs; without the meshes the folder is asked for."""
     monkeypatch.delenv("DEX_URDF", raising=False)
     for robot in known_robots():
         side = "left" if robot.endswith("_left") else "right"

@@ -30,7 +30,7 @@ class Pads:
         touching: whether each of these fingers touches; gaps of less than 0.2 s, as recordings have them, are filled.
         tips: of all five fingers, by name.
         grasp: the frame.
-        wraps: whether more than pads touch then: the palm, or all three phalanges of two fingers.
+        wraps: whether more than pads touch then, of three fingers and more: the palm, or all three phalanges of two.
     """
 
     fingers: tuple[str, ...]
@@ -71,7 +71,8 @@ def demonstrated_pads(demonstration: Demonstration, person: RigidHand) -> Pads:
     touch.place(coordinates[grasp], demonstration.object_pose[grasp])
     held = [found[grasp][finger] for finger in fingers]
     touching_links = Counter(touch.fingers[k] for k, *_ in touch.nearest(NEAR))
-    wraps = "" in touching_links or sum(count > 2 for count in touching_links.values()) > 1
+    around = "" in touching_links or sum(count > 2 for count in touching_links.values()) > 1
+    wraps = around and len(fingers) > 2  # a card between thumb and index finger may lie against the palm
     on_links = [(number, touch.on_link(number, point)) for number, _, point, _ in held]
     surface = np.stack([point + gap * way for _, gap, point, way in held])
     places = np.empty((demonstration.num_frames, len(fingers), 3))

@@ -1,5 +1,6 @@
 """`RobotScene`: a robot hand and a demonstration's object, and what is asked of them."""
 
+import mujoco
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
@@ -45,6 +46,7 @@ class RobotScene:
         self.middle = (self.low + self.high) / 2
         self.last = {finger: k for k, finger in enumerate(self.touch.fingers)}  # each finger's last link
         ground = self.touch.ground
+        self.model.geom_sameframe[ground] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE  # or their places are not read
         self._ground = self.model.geom_pos[ground].copy(), self.model.geom_quat[ground].copy()
         self.sites = {finger: self.model.site(f"{finger}_tip").id for finger in body.fingers}
 

@@ -11,6 +11,7 @@ from envs.demonstrations.on_robot.bring import on_robot
 from envs.demonstrations.on_robot.least_squares import solve
 from envs.demonstrations.on_robot.left_out import NO_CLOSURE, NO_FINGERS, LeftOut
 from envs.demonstrations.on_robot.pads import demonstrated_pads
+from envs.demonstrations.on_robot.robot_scene import RobotScene
 from envs.demonstrations.set_settings import SetSettings
 from envs.model_grip import NEAR
 from envs.reference import demonstrated_targets
@@ -96,6 +97,43 @@ def test_nothing_comes_near_the_object_before_it_is_touched(brought, demonstrati
     assert before > 3
     assert min(least[:before]) > NEAR
     assert min(least) > -0.002
+
+
+def test_no_link_is_in_table_or_support(brought, allegro):
+    """By MuJoCo's distances, from approach to lift: a larger hand's thumb would be 1 to 4 mm inside the cube's support,
+    and of cards and balls 2 cm inside the table."""
+    d = brought.demonstration
+    model = demonstration_spec(d, allegro).compile()
+    data, targets = mujoco.MjData(model), demonstrated_targets(d)
+    ground = [g for g in range(model.ngeom) if model.geom_bodyid[g] == 0]
+    assert len(ground) > 1
+    links = [model.geom(c.name).id for c in allegro.contacts]
+    for frame in range(0, d.num_frames, 3):
+        data.qpos[:] = np.concatenate([targets[frame], d.object_pose[frame]])
+        mujoco.mj_kinematics(model, data)
+        assert min(mujoco.mj_geomDistance(model, data, a, b, 0.1, None) for a in links for b in ground) > 0.0, frame
+
+
+def test_the_ground_goes_with_the_object(demonstrations, hands, allegro):
+    """A grasp is sought where the object is carried: there table and support are to it as where it was picked up."""
+    scene = RobotScene(demonstrations[1], hands[1], allegro)
+    data, ground = scene.touch.data, scene.touch.ground
+
+    def seen_from_the_object() -> np.ndarray:
+        pose = data.body(OBJECT).xpos, data.body(OBJECT).xmat.reshape(3, 3)
+        places = (data.geom_xpos[ground] - pose[0]) @ pose[1]
+        turns = pose[1].T @ data.geom_xmat[ground].reshape(-1, 3, 3)
+        return np.concatenate([places[:, None], turns], axis=1)
+
+    scene.place(scene.middle, 0)
+    start, world = seen_from_the_object(), data.geom_xpos[ground].copy()
+    scene.put_ground(scene.pads.grasp)
+    scene.place(scene.middle, scene.pads.grasp)
+    np.testing.assert_allclose(seen_from_the_object(), start, atol=1e-9)
+    assert np.linalg.norm(data.geom_xpos[ground] - world, axis=1).min() > 0.02
+    scene.put_ground(0)
+    scene.place(scene.middle, scene.pads.grasp)
+    np.testing.assert_allclose(data.geom_xpos[ground], world, atol=1e-9)
 
 
 def test_the_hand_moves_smoothly_and_within_its_limits(brought, allegro):
