@@ -37,7 +37,7 @@ class Touch:
     Attributes:
         links: those of fingers that have a shape to touch with.
         fingers: of each of them, "" of the palm's.
-        object, ground: shapes that are near: the object's, and what stands still, table and support.
+        object, ground: geoms of the object, and of table and support.
     """
 
     def __init__(self, model: mujoco.MjModel, body: Body, *, palm: bool = False):
@@ -83,10 +83,13 @@ class Touch:
         """The way into the object where a geom just touches it: there the two nearest points are one and do not say."""
         here, ends = self.data.geom_xpos[geom].copy(), np.zeros(6)
         out = here - self.data.geom_xpos[other]
-        self.data.geom_xpos[geom] += _APART * out / max(float(np.linalg.norm(out)), _APART)
+        if self.model.geom_type[other] == mujoco.mjtGeom.mjGEOM_PLANE:  # whose centre may be far aside
+            out = self.data.geom_xmat[other].reshape(3, 3)[:, 2]
+        out = out / max(float(np.linalg.norm(out)), _APART)
+        self.data.geom_xpos[geom] += _APART * out
         gap = mujoco.mj_geomDistance(self.model, self.data, geom, other, 1.0, ends)
         self.data.geom_xpos[geom] = here
-        return (ends[3:] - ends[:3]) / gap
+        return (ends[3:] - ends[:3]) / gap if gap > _APART / 10 else -out
 
     def foremost(self, number: int, way: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
         """A link's point (m, world) that is farthest along a unit way."""

@@ -1,6 +1,6 @@
 """Put an experiment's best policy among those that come with the project.
 
-    python -m tools.bundle_policy config=pinch seed=1
+    python -m tools.bundle_policy config=pinch seed=1 [hand=allegro]
 
 writes it, and a held-out demonstration, into train/policies: of those that it follows and that are lost without a
 policy the one of median tracking error.
@@ -11,10 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
+from envs.demonstrations.load_env import people_of_set
 from envs.evaluation.evaluate import evaluate_in
 from envs.evaluation.roll_out import make_roll_out, zero_residual
+from mjx_hand.bodies.human_body import HUMAN
 from mjx_hand.errors import InputError
 from mjx_hand.motion.demonstration import Demonstration, save_demonstration
+from mjx_hand.robots.robot_hand import known_robots
 from train.experiment import bundled_policies
 from train.experiment.evaluate_seeds import middle
 from train.experiment.setup import load_env, rolled_out, settled
@@ -22,16 +25,19 @@ from train.learning.checkpoint import Checkpoint, save_checkpoint
 from train.settings.config import Config, command
 
 
-def include(checkpoint: Checkpoint, demonstration: Demonstration, name: str) -> list[Path]:
+def include(checkpoint: Checkpoint, demonstration: Demonstration, name: str, hand: str = HUMAN) -> list[Path]:
     """Write both files. The value network, which only training needs, is left out."""
     bundled_policies.FOLDER.mkdir(exist_ok=True)
-    save_checkpoint(dataclasses.replace(checkpoint, value={}), bundled_policies.FOLDER / f"{name}.npz")
-    save_demonstration(demonstration, bundled_policies.demonstration_path(name))
-    return [bundled_policies.FOLDER / f"{name}.npz", bundled_policies.demonstration_path(name)]
+    policy, shown = bundled_policies.policy_path(name, hand), bundled_policies.demonstration_path(name, hand)
+    save_checkpoint(dataclasses.replace(checkpoint, value={}), policy)
+    save_demonstration(demonstration, shown)
+    return [policy, shown]
 
 
 def main(config: Config) -> None:
     """Choose the demonstration and write."""
+    if config.hand not in (HUMAN, *known_robots()):
+        raise InputError(f"hand is {config.hand!r}; policies come along for {', '.join((HUMAN, *known_robots()))}")
     env = load_env(config, "heldout")
     checkpoint, _, scores = rolled_out(config, env)
     idle = evaluate_in(env, make_roll_out(env, zero_residual)(None))
@@ -41,7 +47,11 @@ def main(config: Config) -> None:
     lost = followed & ~idle.scores["manip_trans_object"]
     shown = np.flatnonzero(lost if lost.any() else followed)
     median = int(shown[middle(scores.scores["tracking_error_cm"][shown])])
-    for path in include(checkpoint, env.demonstrations[median], config.name):
+    if config.hand == HUMAN:
+        person = env.demonstrations[median]
+    else:  # what the person did: it is brought onto the robot wherever it is played
+        person, _ = people_of_set(config.data, "heldout", config.demonstrations, config.hand)[median]
+    for path in include(checkpoint, person, config.name, config.hand):
         print(f"{path}: {path.stat().st_size / 1000:.0f} kB")
 
 

@@ -8,13 +8,14 @@ physics step of it that the engine could make.
 """
 
 from envs.demonstrations.load_env import people_of_set
+from envs.grip_table import people_of
 from envs.tracking import TrackingEnv
-from mjx_hand.bodies.human_body import HUMAN, body_of
+from mjx_hand.bodies.human_body import HUMAN
 from mjx_hand.errors import InputError
 from mjx_hand.motion import Demonstration
 from mjx_hand.rigid.rigid_hand import RigidHand
 from mjx_hand.view.browser.viewer import Viewer
-from train.experiment.bundled_policies import bundled_env, with_policy
+from train.experiment.bundled_policies import bundled_env, bundled_people, with_policy
 from train.experiment.evaluate_seeds import median_and_worst
 from train.experiment.setup import chosen_path, load_env, rolled_out, settled
 from train.learning.checkpoint import load_checkpoint
@@ -64,16 +65,19 @@ def rollout_viewer(config: Config) -> Viewer:
     outcome = scores.failure[index] or "followed to the end"
     robot = "" if env.body.name == HUMAN else f" on {env.body.name}"
     title = f"{config.name} {index}{robot}: {outcome}, {errors[index]:.2f} cm"
-    recorded, person = _person(config, env, index)
+    recorded, person = _people(config, env, beside)[index]
     return Viewer(rollout_scene(env, rollouts, index, recorded, person, title), config.play.port)
 
 
-def _person(config: Config, env: TrackingEnv, index: int) -> tuple[Demonstration, RigidHand]:
-    """What the person did that demonstration `index` is of, and the hand that did."""
-    rigid = body_of(env.hands[index]).rigid
-    if rigid is not None:
-        return env.demonstrations[index], rigid
-    return people_of_set(config.data, "heldout", config.demonstrations, config.hand)[index]
+def _people(config: Config, env: TrackingEnv, beside: bool) -> list[tuple[Demonstration, RigidHand]]:
+    """What people did in the demonstrations of the environment, and their hands."""
+    if beside:
+        return bundled_people(config)
+    if config.hand != HUMAN:
+        return people_of_set(config.data, "heldout", config.demonstrations, config.hand)
+    people = people_of(env.hands)
+    assert people is not None  # of a human hand
+    return list(zip(env.demonstrations, people, strict=True))
 
 
 def main(config: Config) -> None:

@@ -49,7 +49,8 @@ def robot_model(
     try:
         links = model_links(hand, collision, absent)
     except AbsentMeshError as error:
-        raise InputError(f"{error}{'' if description.place is None else description.place.others()}") from None
+        own = description.place is not None and urdf == description.place.path
+        raise InputError(f"{error}{description.place.others() if description.place and own else ''}") from None
     robot = RobotModel(
         name=description.name,
         links=links,

@@ -1,6 +1,7 @@
 """Where a robot hand's URDF or MJCF is, as its description says: one place, or several of which the first is taken."""
 
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -12,6 +13,8 @@ from mjx_hand.files.safe_yaml import shown
 from mjx_hand.robots.robot_file import check_mjcf
 
 _KINDS = ("urdf", "mjcf")
+_VARIABLE = re.compile(r"\$([A-Za-z_]\w*)/(.+)")
+_VALID = "give a path from this file on, PACKAGE:PATH, $VARIABLE/PATH, or a list of such places"
 
 
 @dataclass(frozen=True)
@@ -19,26 +22,23 @@ class ModelPlace:
     """Where the file is.
 
     Attributes:
-        path: the file, whether it is there or not; None where it is in a package that is not installed.
-        package: the Python package that it comes with, "" if with none.
+        path: the file, whether it is there or not; None where nobody can say.
+        fault: then, why.
         unset: environment variables that would have named a place before that, and are not set.
     """
 
     path: Path | None
-    package: str = ""
+    fault: str = ""
     unset: tuple[str, ...] = ()
 
     def found(self, robot: str) -> Path:
         """The file.
 
         Raises:
-            InputError: it comes with a package that is not installed.
+            InputError: a package that is not installed, or a variable that is not set or names a folder without it.
         """
         if self.path is None:
-            raise InputError(
-                f"{robot}: its file comes with the Python package {self.package}, which is not installed: pip install "
-                f"{self.package.replace('_', '-')}, or give a URDF of your own{self.others()}"
-            )
+            raise InputError(f"{robot}: {self.fault}{self.others()}")
         return self.path
 
     def others(self) -> str:
@@ -51,10 +51,10 @@ def model_place(path: Path, content: Mapping[str, Any]) -> ModelPlace | None:
 
     A place is a path from the description's folder on, `PACKAGE:PATH` in an installed Python package, or
     `$VARIABLE/PATH`, which counts only where the environment has that variable. Of a list the first that counts is
-    taken, and what is wrong with it is said; nothing is searched for beyond that.
+    taken, and what is wrong with it is said when it is wanted; nothing is searched for beyond that.
 
     Raises:
-        InputError: not such places, or a variable that names a folder without the file.
+        InputError: not such places.
     """
     given = [name for name in _KINDS if content.get(name) is not None]
     if not given:
@@ -64,20 +64,24 @@ def model_place(path: Path, content: Mapping[str, Any]) -> ModelPlace | None:
     kind, value = given[0], content[given[0]]
     places = value if isinstance(value, list) else [value]
     if not places or not all(isinstance(place, str) and place for place in places):
-        raise InputError(f"{path}: {kind} is {shown(value)}; give a path from this file on, or PACKAGE:PATH")
+        raise InputError(f"{path}: {kind} is {shown(value)}; {_VALID}")
+    variables = [_VARIABLE.fullmatch(place) for place in places]
+    if any(found is None and place.startswith("$") for found, place in zip(variables, places, strict=True)):
+        raise InputError(f"{path}: {kind} is {shown(value)}; {_VALID}")
+    if None in variables[:-1]:
+        raise InputError(f"{path}: {kind} is {shown(value)}; only its last place may be without a $VARIABLE")
     unset: list[str] = []
-    for place in places:
-        variable, slash, inside = place.partition("/")
-        if not variable.startswith("$"):
-            return _named(path, kind, place, tuple(unset))
-        folder = os.environ.get(variable[1:], "")
-        if folder:
+    for found in variables:
+        if found is None:
+            return _named(path, kind, places[-1], tuple(unset))
+        name, inside = found.groups()
+        if folder := os.environ.get(name, ""):
             file = Path(folder).expanduser() / inside
-            if not slash or not file.is_file():
-                raise InputError(f"{path}: {variable[1:]} is {shown(folder)}, which has no {inside}; give its folder")
-            return _checked(kind, ModelPlace(file))
-        unset.append(variable[1:])
-    raise InputError(f"{path}: {kind} is {shown(value)}; set {unset[0]} to the folder that has it")
+            if file.is_file():
+                return _checked(kind, ModelPlace(file))
+            return ModelPlace(None, f"{name} is {shown(folder)}, which has no {inside}; give the folder that has it")
+        unset.append(name)
+    return ModelPlace(None, f"its file is in a folder that {unset[0]} would name, which is not set", tuple(unset))
 
 
 def _named(path: Path, kind: str, place: str, unset: tuple[str, ...]) -> ModelPlace:
@@ -86,8 +90,12 @@ def _named(path: Path, kind: str, place: str, unset: tuple[str, ...]) -> ModelPl
         return _checked(kind, ModelPlace(path.parent / place, "", unset))
     spec = find_spec(package) if package.isidentifier() else None
     if spec is None or spec.origin is None:
-        return ModelPlace(None, package, unset)
-    return _checked(kind, ModelPlace(Path(spec.origin).parent / inside, package, unset))
+        fault = (
+            f"its file comes with the Python package {package}, which is not installed: pip install "
+            f"{package.replace('_', '-')}, or give a URDF of your own"
+        )
+        return ModelPlace(None, fault, unset)
+    return _checked(kind, ModelPlace(Path(spec.origin).parent / inside, "", unset))
 
 
 def _checked(kind: str, place: ModelPlace) -> ModelPlace:

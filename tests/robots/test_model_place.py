@@ -8,6 +8,7 @@ from mjx_hand.bodies.robot_body import robot_body
 from mjx_hand.errors import InputError
 from mjx_hand.robots.model_place import model_place
 from mjx_hand.robots.robot_hand import known_robots, load_robot
+from mjx_hand.robots.robot_hand import urdf_of as file_of
 from tests.robots.urdfs import urdf_of
 
 
@@ -38,16 +39,34 @@ def test_the_first_place_that_counts_is_taken(folder, monkeypatch):
 def test_a_folder_that_has_no_such_file_is_said_and_not_passed_over(folder, monkeypatch):
     """Whoever sets a variable means it: another file in its place would be a different robot, silently."""
     monkeypatch.setenv("HANDS", str(folder / "elsewhere"))
-    with pytest.raises(InputError, match=r"HANDS is '.*elsewhere', which has no hand\.urdf; give its folder"):
-        model_place(folder / "robot.yaml", {"urdf": ["$HANDS/hand.urdf", "hand.urdf"]})
+    place = model_place(folder / "robot.yaml", {"urdf": ["$HANDS/hand.urdf", "hand.urdf"]})
+    assert place is not None
+    with pytest.raises(InputError, match=r"robot: HANDS is '.*elsewhere', which has no hand\.urdf; give the folder"):
+        place.found("robot")
+
+
+def test_a_variable_is_nothing_to_who_gives_the_file(folder, monkeypatch):
+    monkeypatch.setenv("DEX_URDF", str(folder))
+    assert file_of(load_robot("allegro"), folder / "hand.urdf") == folder / "hand.urdf"
+    with pytest.raises(InputError, match="allegro: DEX_URDF is"):
+        file_of(load_robot("allegro"))
+
+
+def test_a_single_variable_that_is_not_set_is_named(folder):
+    place = model_place(folder / "robot.yaml", {"urdf": "$HANDS/hand.urdf"})
+    assert place is not None
+    with pytest.raises(InputError, match=r"HANDS would name, which is not set; or set HANDS to a folder"):
+        place.found("robot")
 
 
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"urdf": "$HANDS/hand.urdf"}, "set HANDS to the folder that has it"),
-        ({"urdf": []}, "give a path from this file on, or PACKAGE:PATH"),
-        ({"urdf": ["hand.urdf", 3]}, "give a path from this file on, or PACKAGE:PATH"),
+        ({"urdf": "$HANDS"}, r"give a path from this file on, PACKAGE:PATH, \$VARIABLE/PATH"),
+        ({"urdf": "${HANDS}/hand.urdf"}, r"give a path from this file on, PACKAGE:PATH, \$VARIABLE/PATH"),
+        ({"urdf": []}, "give a path from this file on, PACKAGE:PATH"),
+        ({"urdf": ["hand.urdf", 3]}, "give a path from this file on, PACKAGE:PATH"),
+        ({"urdf": ["hand.urdf", "other.urdf"]}, r"only its last place may be without a \$VARIABLE"),
         ({"urdf": "hand.urdf", "mjcf": "hand.xml"}, "has urdf and mjcf; give one of them"),
         ({"mjcf": "hand.urdf"}, "not an MJCF"),
     ],

@@ -3,38 +3,62 @@
 import dataclasses
 from pathlib import Path
 
+from envs.demonstrations.on_robot.robot_set import robot_demonstrations
 from envs.demonstrations.twin_hands import twins
 from envs.tracking import TrackingEnv
 from mjx_hand.bodies.human_body import HUMAN
-from mjx_hand.motion.demonstration import load_demonstration
+from mjx_hand.bodies.robot_body import robot_body
+from mjx_hand.motion.demonstration import Demonstration, load_demonstration
+from mjx_hand.rigid.rigid_hand import RigidHand
 from train.experiment.setup import chosen_path
 from train.settings.config import Config
 
 FOLDER = Path(__file__).parent.parent / "policies"
 
 
-def bundled_policy(name: str) -> Path | None:
-    """The policy of this experiment that comes with the project, if one does."""
-    path = FOLDER / f"{name}.npz"
+def bundled_policy(name: str, hand: str = HUMAN) -> Path | None:
+    """The policy of this experiment, for this hand, that comes with the project, if one does."""
+    path = policy_path(name, hand)
     return path if path.is_file() else None
 
 
 def bundled_env(config: Config) -> TrackingEnv:
     """The environment over the one demonstration that comes with the experiment's policy."""
-    demonstrations = [load_demonstration(demonstration_path(config.name))]
-    return TrackingEnv(demonstrations, twins(demonstrations), config.engine, config.task)
+    people = bundled_people(config)
+    demonstrations, hands = [d for d, _ in people], [hand for _, hand in people]
+    if config.hand == HUMAN:
+        return TrackingEnv(demonstrations, hands, config.engine, config.task)
+    body = robot_body(config.hand)
+    brought = robot_demonstrations(demonstrations, hands, body)
+    return TrackingEnv(brought, [body] * len(brought), config.engine, config.task)
 
 
-def demonstration_path(name: str) -> Path:
-    """Where the demonstration is that comes with this experiment's policy."""
-    return FOLDER / f"{name}.demonstration.npz"
+def bundled_people(config: Config) -> list[tuple[Demonstration, RigidHand]]:
+    """What a person did, and the hand, in the demonstration that comes with the experiment's policy."""
+    demonstrations = [load_demonstration(demonstration_path(config.name, config.hand))]
+    return list(zip(demonstrations, twins(demonstrations), strict=True))
+
+
+def policy_path(name: str, hand: str = HUMAN) -> Path:
+    """Where this experiment's policy for a hand is, or would be."""
+    return FOLDER / f"{_called(name, hand)}.npz"
+
+
+def demonstration_path(name: str, hand: str = HUMAN) -> Path:
+    """Where the person's demonstration is that comes with this experiment's policy."""
+    return FOLDER / f"{_called(name, hand)}.demonstration.npz"
 
 
 def with_policy(config: Config) -> tuple[Config, bool]:
     """The configuration with the policy to use: its own, or where nothing is trained, and one comes with the project,
     that one; and whether it is that one."""
-    included = bundled_policy(config.name)
-    if config.checkpoint or config.hand != HUMAN or included is None or chosen_path(config).is_file():
+    included = bundled_policy(config.name, config.hand)
+    if config.checkpoint or included is None or chosen_path(config).is_file():
         return config, False
     print(f"nothing is trained in {config.out}: taking the policy that comes with mjx-hand", flush=True)
     return dataclasses.replace(config, checkpoint=str(included)), True
+
+
+def _called(name: str, hand: str) -> str:
+    """A robot hand's policies are called by its description's name as well; the path of a description names none."""
+    return name if hand == HUMAN else f"{name}-{hand}"

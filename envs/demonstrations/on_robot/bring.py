@@ -118,4 +118,4 @@ def _fault(scene: RobotScene, grasp: Grasp) -> LeftOut | None:
     points, ways = (np.array([contact[k] for contact in contacts]).reshape(-1, 3) for k in (0, 1))
     if closes(points, ways, scene.demonstration.object.friction):
         return None
-    return LeftOut(NO_CLOSURE, f"{name}: no posture of it has force closure, {len(points)} of its links touch")
+    return LeftOut(NO_CLOSURE, f"{name}: no posture of it has force closure, in the best {len(points)} links touch")

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.on_robot.least_squares import solve
 from envs.demonstrations.on_robot.robot_scene import CLEAR, RobotScene
-from envs.demonstrations.on_robot.sticking import followed_places, onto
+from envs.demonstrations.on_robot.sticking import followed_places, still_near
 from envs.scene import NUM_WRIST
 
 APPROACH = 0.012  # m that links keep off the object while nothing touches: beyond where the grip closes gaps
@@ -72,8 +72,8 @@ def follow(scene: RobotScene, grasp: Float[np.ndarray, "u"]) -> Float[np.ndarray
 def _touches(scene: RobotScene) -> dict[str, Float[np.ndarray, "t"]]:
     """How much each finger, and the palm (""), touches in each frame, from 0 to 1; the palm as much as any does."""
     pads, fps = scene.pads, scene.demonstration.motion.fps
-    fingers = {finger: onto(pads.touching[:, k], fps) for k, finger in enumerate(pads.fingers)}
-    return fingers | {"": onto(pads.touching.any(axis=1), fps)}
+    fingers = {finger: still_near(pads.touching[:, k], fps) for k, finger in enumerate(pads.fingers)}
+    return fingers | {"": still_near(np.asarray(pads.touching.any(axis=1)), fps)}
 
 
 def _clearances(scene: RobotScene, touches: dict[str, Float[np.ndarray, "t"]]) -> Float[np.ndarray, "t l"]:

@@ -4,7 +4,7 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from envs.demonstrations.on_robot.least_squares import solve
 from envs.demonstrations.on_robot.robot_scene import CLEAR, OFF_GROUND, RobotScene
@@ -88,9 +88,7 @@ def find_grasps(scene: RobotScene) -> list[Grasp]:
 
     scene.put_ground(frame)
     found: list[tuple[float, np.ndarray]] = []
-    scene.place(scene.middle, frame)
-    moved = [scene.jacobian(k, scene.touch.data.xpos[scene.model.body(scene.touch.links[k]).id]) for k in wanted]
-    idle = ~np.any(np.abs(moved) > 1e-9, axis=(0, 1))  # what moves no finger that touches
+    idle = idle_targets(scene)
     for bent, idle_bent in itertools.product(_BENT, _IDLE_BENT if idle.any() else (0.0,)):
         start = scene.low + np.where(idle, idle_bent, bent) * (scene.high - scene.low)
         start[:NUM_WRIST] = wrist
@@ -106,7 +104,14 @@ def find_grasps(scene: RobotScene) -> list[Grasp]:
         off = np.array([np.linalg.norm(near[k][1] - place) for k, place in zip(wanted, places, strict=True)])
         gap = np.array([near[k][0] for k in wanted])
         depth = max(0.0, -min(rest[0] for rest in near.values()))
-        sunk = max([0.0, *(-gap for _, gap, _, _ in scene.touch.nearest(OFF_GROUND, scene.touch.ground))])
+        sunk = max([0.0, *(-to_ground for _, to_ground, _, _ in scene.touch.nearest(OFF_GROUND, scene.touch.ground))])
         grasps.append(Grasp(targets, off, depth, np.maximum(gap, 0.0), sunk))
     scene.put_ground(0)
     return grasps
+
+
+def idle_targets(scene: RobotScene) -> Bool[np.ndarray, "u"]:
+    """Which targets move no finger that touches: the joints of the others."""
+    scene.place(scene.middle, scene.pads.grasp)
+    ends = [(scene.last[finger], scene.touch.data.site_xpos[scene.sites[finger]]) for finger in scene.pads.fingers]
+    return ~np.any(np.abs([scene.jacobian(link, tip) for link, tip in ends]) > 1e-9, axis=(0, 1))

@@ -57,8 +57,8 @@ class RobotScene:
     def put_ground(self, frame: int) -> None:
         """Put table and support where they are to the object of this frame as they are to it at the beginning.
 
-        A grasp is sought where the object is carried, and has to be one that picks it up. Of frame 0 they are where
-        they are.
+        A grasp is sought where the object is carried, and has to be one that picks it up. Frame 0 puts them
+        back.
         """
         place, turn = self._ground
         start, there = self.demonstration.object_pose[0], self.demonstration.object_pose[frame]

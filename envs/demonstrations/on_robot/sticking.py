@@ -44,3 +44,11 @@ def onto(touching: Bool[np.ndarray, "t"], fps: float) -> Float[np.ndarray, "t"]:
     ramp = round(_ONTO * fps) + 1
     inside = np.asarray(distance_transform_edt(np.pad(touching, ramp, mode="edge")))[ramp:-ramp]
     return smoothstep(inside / ramp)
+
+
+def still_near(touching: Bool[np.ndarray, "t"], fps: float) -> Float[np.ndarray, "t"]:
+    """How near a pad is to be in each frame, from 0 to 1: it closes as `onto`, and opens only after it touched."""
+    late = touching.copy()
+    for frames in range(1, round(_ONTO * fps) + 1):
+        late[frames:] |= touching[:-frames]
+    return onto(late, fps)

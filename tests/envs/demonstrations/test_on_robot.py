@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from envs.demonstrations.load_env import env_of_set
-from envs.demonstrations.on_robot.bring import on_robot
+from envs.demonstrations.on_robot.bring import _first_possible, on_robot
+from envs.demonstrations.on_robot.grasp import find_grasps, idle_targets
 from envs.demonstrations.on_robot.least_squares import solve
-from envs.demonstrations.on_robot.left_out import NO_CLOSURE, NO_FINGERS, LeftOut
+from envs.demonstrations.on_robot.left_out import NO_CLOSURE, NO_FINGERS, OUT_OF_REACH, LeftOut
 from envs.demonstrations.on_robot.pads import demonstrated_pads
 from envs.demonstrations.on_robot.robot_scene import RobotScene
 from envs.demonstrations.set_settings import SetSettings
@@ -153,9 +154,34 @@ def test_what_a_robot_cannot_do_is_left_out_with_the_reason(demonstrations, hand
         on_robot(d, hands[1], dataclasses.replace(allegro, fingers=("ring", "thumb")))
     assert left_out.value.reason == NO_FINGERS
     ice = replace(d, object=dataclasses.replace(d.object, friction=0.001))
-    with pytest.raises(LeftOut, match="no posture of it has force closure") as left_out:
+    with pytest.raises(
+        LeftOut, match=r"no posture of it has force closure, in the best [0-9]+ links touch"
+    ) as left_out:
         on_robot(ice, hands[1], allegro)
     assert left_out.value.reason == NO_CLOSURE
+
+
+def test_the_best_grasp_that_can_hold_is_taken(demonstrations, hands, allegro):
+    """One that is inside the table is passed over; where none is left its reason is told."""
+    scene = RobotScene(demonstrations[1], hands[1], allegro)
+    grasps = find_grasps(scene)
+    assert _first_possible(scene, grasps) is grasps[0]
+    sunk = dataclasses.replace(grasps[0], sunk=0.01)
+    assert _first_possible(scene, [sunk, *grasps[1:]]) is not sunk
+    with pytest.raises(LeftOut, match="its links are 10 mm inside table or support") as left_out:
+        _first_possible(scene, [sunk])
+    assert left_out.value.reason == OUT_OF_REACH
+
+
+def test_joints_of_fingers_that_touch_are_not_idle(demonstrations, hands, allegro):
+    """A last link may hang on the joint itself, which then does not move its origin."""
+    body = dataclasses.replace(allegro)
+    scene = RobotScene(demonstrations[1], hands[1], body)
+    idle = idle_targets(scene)
+    assert idle.sum() == 4  # the ring finger's
+    assert all(allegro.joints[k - 6].endswith(("8.0", "9.0", "10.0", "11.0")) for k in np.flatnonzero(idle))
+    scene.last = {finger: k - 1 if finger == "index" else k for finger, k in scene.last.items()}  # a link on its joint
+    np.testing.assert_array_equal(idle_targets(scene), idle)
 
 
 def test_a_hand_of_the_other_side_is_refused(demonstrations, hands, allegro):

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.on_robot.pads import Pads
-from envs.demonstrations.on_robot.sticking import followed_places
+from envs.demonstrations.on_robot.sticking import followed_places, onto, still_near
 from mjx_hand.pytree import replace
 
 FIRST, LAST, GRASP = 40, 90, 60
@@ -28,3 +28,16 @@ def test_a_pad_sticks_while_the_finger_touches_and_follows_it_else(demonstration
     outside = np.r_[0:FIRST, LAST:120]
     np.testing.assert_allclose(seen[outside], own[outside] + off, atol=1e-9)
     assert np.abs(np.diff(seen, axis=0)).max() < 0.0015  # no jolt: 1 mm a frame is the finger's own
+
+
+def test_a_pad_opens_only_after_it_touched():
+    """Closing begins with the touch, opening with its end: what is still held is not let go."""
+    touching = np.zeros(60, bool)
+    touching[20:40] = True
+    near = still_near(touching, 50.0)
+    assert (near[:20] == 0).all()
+    assert (np.diff(near[20:27]) >= 0).all()
+    assert (near[26:40] == 1).all()
+    assert 0 < near[42] < 1
+    assert (near[46:] == 0).all()
+    assert (onto(touching, 50.0)[36:40] < 1).all()  # what goes with the object has parted from it by then

@@ -10,6 +10,7 @@ import train.experiment.bundled_policies
 from envs.evaluation.evaluate import evaluate
 from envs.evaluation.roll_out import make_roll_out, zero_residual
 from envs.grasps import FIVE
+from mjx_hand.bodies.human_body import HUMAN
 from mjx_hand.errors import InputError
 from mjx_hand.player.features import OBSERVATION_LIMIT
 from tools import bundle_policy
@@ -24,6 +25,14 @@ from train.settings.options import Play
 from train.settings.saved import contradiction, policy_settings
 
 Trained = tuple[Path, list[Point]]
+# Experiments and hands of the policies that come along for robots.
+ROBOTS = sorted(
+    (name, hand)
+    for name, dash, hand in (
+        path.stem.partition("-") for path in train.experiment.bundled_policies.FOLDER.glob("*.npz")
+    )
+    if dash and not hand.endswith(".demonstration")
+)
 
 
 @pytest.fixture
@@ -58,10 +67,11 @@ def test_without_one_the_command_that_trains_is_named(untrained: Config):
         viewer(untrained)
 
 
-@pytest.mark.parametrize("name", [*FIVE, "all"])
-def test_the_policies_that_come_along_are_of_todays_experiments(name: str, tmp_path):
+@pytest.mark.parametrize(("name", "hand"), [*((name, HUMAN) for name in (*FIVE, "all")), *ROBOTS])
+def test_the_policies_that_come_along_are_of_todays_experiments(name: str, hand: str, tmp_path):
     """As `train.play config=NAME` has it where nothing is trained, without a word on the command line."""
-    config, included = with_policy(settled(compose([f"config={name}", f"out={tmp_path}"]), {"config", "out"}))
+    asked = [f"config={name}", f"hand={hand}", f"out={tmp_path}"]
+    config, included = with_policy(settled(compose(asked), {"config", "hand", "out"}))
     assert included
     told = load_checkpoint(config.checkpoint).settings
     assert contradiction("the policy", told, policy_settings(config)) == ""
@@ -83,6 +93,24 @@ def test_the_policies_that_come_along_do_what_the_zero_residual_does_not(name: s
     assert scores["tracking_error_cm"] < 0.5
     idle = evaluate(make_roll_out(env, zero_residual)(None), objects).rows()
     assert idle["tracking_error_cm"] > 2 * scores["tracking_error_cm"]
+
+
+@pytest.mark.parametrize(("name", "hand"), ROBOTS)
+def test_the_robots_policies_hold_what_the_person_held(name: str, hand: str):
+    """From frame 0 and five seconds longer; the hand by its own URDF and meshes."""
+    config = compose([f"config={name}", f"hand={hand}", "engine=native"])
+    config = settled(dataclasses.replace(config, checkpoint=str(bundled_policy(name, hand))), ())
+    try:
+        env = bundled_env(config)
+    except InputError as error:
+        if "is not there" not in str(error) and "is not installed" not in str(error):
+            raise
+        pytest.skip(str(error))
+    checkpoint = chosen_checkpoint(config, env.observation_size, env.action_size)
+    policy = deterministic_policy(config.ppo, env.observation_size, env.action_size)
+    scores = evaluate(make_roll_out(env, policy, 5.0)(checkpoint.policy), [d.object for d in env.demonstrations]).rows()
+    assert scores["manip_trans_object"] == scores["hold"] == 1
+    assert scores["tracking_error_cm"] < 1.0
 
 
 @pytest.mark.parametrize("name", FIVE)
