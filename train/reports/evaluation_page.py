@@ -11,6 +11,7 @@ from envs.evaluation.evaluate import Evaluation
 from envs.evaluation.metrics import grip_force, position_error
 from envs.evaluation.people import people_of, person_scores
 from envs.evaluation.rollout import Rollouts
+from mjx_hand.bodies.human_body import HUMAN
 from mjx_hand.view.figures import plots
 from mjx_hand.view.report import Film, Headline, Plot, Report, Section, Table
 from train.experiment.evaluate_seeds import (
@@ -29,7 +30,7 @@ from train.reports.interval import intervals
 from train.reports.machine import processor, versions
 from train.reports.overlap_table import overlap_table
 from train.reports.people_table import people_table
-from train.reports.published import PAPER
+from train.reports.published import PAPER, Published
 from train.reports.score_table import demonstration_table, failed_table, failure_table, score_table
 from train.reports.stress_table import stress_figure, stress_table
 from train.reports.type_table import groups, type_table
@@ -59,7 +60,7 @@ def tables(results: Mapping[int, Results], config: Config) -> tuple[Table, ...]:
     columns |= {title: [first.evaluations[title]] for title in BASELINES}
     grasps = _grasps(first)
     by_type = [type_table(columns, grasps)] if len(set(grasps)) > 1 else []
-    return score_table(columns, PAPER.get(config.data.grasp), note), failure_table(columns), *by_type
+    return score_table(columns, _published(config), note), failure_table(columns), *by_type
 
 
 def headlines(policies: Sequence[Evaluation]) -> list[Headline]:
@@ -144,12 +145,13 @@ def evaluation_page(
     scores, failures, *by_type = tables(results, config)
     objects = [demonstration.object for demonstration in first.env.demonstrations]
     errors = [e.rows()["tracking_error_cm"] for e in policies.values()]
-    paper = PAPER.get(config.data.grasp)
+    paper = _published(config)
     failed = failed_table(policies)
     people = person_scores(list(policies.values()), people_of(first.env.demonstrations))
     seeds = ", ".join(str(seed) for seed in policies)
+    robot = "" if config.hand == HUMAN else f" hand={config.hand}"
     return Report(
-        title=f"{config.name}: evaluation",
+        title=f"{config.name}{robot and f' on {first.env.body.name}'}: evaluation",
         task=(
             f"{len(objects)} {PART_WORDS[config.part]} ({', '.join(dict.fromkeys(_grasps(first)))})"
             f"{'' if config.part == 'train' else ', which training has not seen'}, from the first frame to the last, "
@@ -204,11 +206,16 @@ def evaluation_page(
             ("versions", ", ".join(f"{n} {v}" for n, v in versions("mjx-hand", "mujoco", "jax", "brax").items())),
         ],
         commands=[
-            f"python -m train.evaluate config={config.name} seeds=[{seeds.replace(' ', '')}]"
+            f"python -m train.evaluate config={config.name}{robot} seeds=[{seeds.replace(' ', '')}]"
             + ("" if config.part == Config().part else f" part={config.part}")
             + (" stress=true" if disturbed else "")
         ],
     )
+
+
+def _published(config: Config) -> Published | None:
+    """What the paper reports of this grasp type, of a human hand."""
+    return PAPER.get(config.data.grasp) if config.hand == HUMAN else None
 
 
 def _grasps(result: Results) -> list[str]:
