@@ -47,10 +47,8 @@ def main(config: Config) -> None:
     lost = followed & ~idle.scores["manip_trans_object"]
     shown = np.flatnonzero(lost if lost.any() else followed)
     median = int(shown[middle(scores.scores["tracking_error_cm"][shown])])
-    if config.hand == HUMAN:
-        person = env.demonstrations[median]
-    else:  # what the person did: it is brought onto the robot wherever it is played
-        person, _ = people_of_set(config.data, "heldout", config.demonstrations, config.hand)[median]
+    # What the person did: it is brought onto a robot wherever it is played.
+    person, _ = people_of_set(config.data, "heldout", config.demonstrations, config.hand)[median]
     for path in include(checkpoint, person, config.name, config.hand):
         print(f"{path}: {path.stat().st_size / 1000:.0f} kB")
 

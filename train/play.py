@@ -71,13 +71,12 @@ def rollout_viewer(config: Config) -> Viewer:
 
 def _people(config: Config, env: TrackingEnv, beside: bool) -> list[tuple[Demonstration, RigidHand]]:
     """What people did in the demonstrations of the environment, and their hands."""
+    people = people_of(env.hands)
+    if people is not None:
+        return list(zip(env.demonstrations, people, strict=True))
     if beside:
         return bundled_people(config)
-    if config.hand != HUMAN:
-        return people_of_set(config.data, "heldout", config.demonstrations, config.hand)
-    people = people_of(env.hands)
-    assert people is not None  # of a human hand
-    return list(zip(env.demonstrations, people, strict=True))
+    return people_of_set(config.data, "heldout", config.demonstrations, config.hand)
 
 
 def main(config: Config) -> None:

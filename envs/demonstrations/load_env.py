@@ -1,5 +1,6 @@
 """`load`: an environment ready to step, by the name of a grasp type or from a folder of finished demonstrations."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from envs.demonstrations.load_set import load_demonstrations
@@ -66,7 +67,21 @@ def env_of_set(
     Raises:
         InputError: as `load`.
     """
-    demonstrations = load_demonstrations(settings, part, root)
+    return env_of(load_demonstrations(settings, part, root), engine, task, randomize, hand)
+
+
+def env_of(
+    demonstrations: Sequence[Demonstration],
+    engine: str,
+    task: Task | None,
+    randomize: Randomize | None = None,
+    hand: str = HUMAN,
+) -> TrackingEnv:
+    """The environment over people's demonstrations, for their own hands or brought onto a robot's.
+
+    Raises:
+        InputError: as `load`.
+    """
     people = twins(demonstrations)
     if hand == HUMAN:
         return TrackingEnv(demonstrations, people, engine, task, randomize=randomize)
@@ -78,12 +93,14 @@ def env_of_set(
 def people_of_set(
     settings: SetSettings, part: str, root: str | Path, hand: str
 ) -> list[tuple[Demonstration, RigidHand]]:
-    """What people did, and their hands, in the demonstrations that `env_of_set` is over for a robot hand, in its order.
+    """What people did, and their hands, in the demonstrations that `env_of_set` is over for a hand, in its order.
 
     Raises:
         InputError: as `load`.
     """
     demonstrations = load_demonstrations(settings, part, root)
     people = twins(demonstrations)
+    if hand == HUMAN:
+        return list(zip(demonstrations, people, strict=True))
     done = robot_set(demonstrations, people, robot_body(hand)).done
     return [(demonstrations[k], people[k]) for k in done]

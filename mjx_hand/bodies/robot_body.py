@@ -49,8 +49,8 @@ def robot_model(
     try:
         links = model_links(hand, collision, absent)
     except AbsentMeshError as error:
-        own = description.place is not None and urdf == description.place.path
-        raise InputError(f"{error}{description.place.others() if description.place and own else ''}") from None
+        place = description.place  # of a file that the caller gave it says nothing
+        raise InputError(f"{error}{place.others() if place and urdf == place.path else ''}") from None
     robot = RobotModel(
         name=description.name,
         links=links,

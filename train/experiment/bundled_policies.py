@@ -3,11 +3,10 @@
 import dataclasses
 from pathlib import Path
 
-from envs.demonstrations.on_robot.robot_set import robot_demonstrations
+from envs.demonstrations.load_env import env_of
 from envs.demonstrations.twin_hands import twins
 from envs.tracking import TrackingEnv
 from mjx_hand.bodies.human_body import HUMAN
-from mjx_hand.bodies.robot_body import robot_body
 from mjx_hand.motion.demonstration import Demonstration, load_demonstration
 from mjx_hand.rigid.rigid_hand import RigidHand
 from train.experiment.setup import chosen_path
@@ -24,13 +23,8 @@ def bundled_policy(name: str, hand: str = HUMAN) -> Path | None:
 
 def bundled_env(config: Config) -> TrackingEnv:
     """The environment over the one demonstration that comes with the experiment's policy."""
-    people = bundled_people(config)
-    demonstrations, hands = [d for d, _ in people], [hand for _, hand in people]
-    if config.hand == HUMAN:
-        return TrackingEnv(demonstrations, hands, config.engine, config.task)
-    body = robot_body(config.hand)
-    brought = robot_demonstrations(demonstrations, hands, body)
-    return TrackingEnv(brought, [body] * len(brought), config.engine, config.task)
+    demonstration = load_demonstration(demonstration_path(config.name, config.hand))
+    return env_of([demonstration], config.engine, config.task, hand=config.hand)
 
 
 def bundled_people(config: Config) -> list[tuple[Demonstration, RigidHand]]:
