@@ -1,11 +1,11 @@
 """`on_robot`: a person's demonstration as a robot's.
 
 The object goes its way as demonstrated. A robot's hand is larger or smaller than a person's, has other fingers and
-other knuckles: wrists cannot coincide, contacts can. First grasps are sought, by damped least squares from
-several postures: each robot finger whose person's finger touches lies with its last link on the object at the same place, no other link is inside
-the object, none in table or support, and the wrist is turned as the person's where that leaves a choice. From the best
-that could hold the object the wrist then goes as the person's went, and fingers are where the person's pads were, but
-off the object until they touch it.
+other knuckles: wrists cannot coincide, contacts can. First grasps are sought, by damped least squares from several
+postures: each robot finger whose person's finger touches lies with its last link on the object at the same place, no
+other link is inside the object, none in table or support, and the wrist is turned as the person's where that leaves a
+choice. From the best that could hold the object the wrist then goes as the person's went, and fingers are where the
+person's pads were, but off the object until they touch it.
 """
 
 from collections.abc import Sequence
