@@ -60,6 +60,7 @@ class Pipeline:
         self._arrivals: Newest[Arrival] = Newest()
         self._targets: Newest[Target] = Newest()
         self._stop = threading.Event()
+        self._ended = threading.Event()  # the source has no more; what it gave last may not have been tracked yet
         self._state = "no hand has been seen yet"
         self._over = threading.Event()
         self._failure: Exception | None = None
@@ -117,15 +118,18 @@ class Pipeline:
 
     def _frames(self) -> None:
         self._source.run(self._arrivals.put, self._stop, self._timing)
-        self._over.set()
+        self._ended.set()
 
     def _tracking(self) -> None:
         heard = 0.0
         while not self._stop.is_set():
+            ended = self._ended.is_set()  # asked before what is left is taken: a last frame may come in between
             arrival = self._arrivals.take(0.05)
             now = time.monotonic()
             self._timing.counts["replaced"] = self._arrivals.replaced + self._targets.replaced
             if arrival is None:
+                if ended:
+                    self._over.set()
                 if now - heard > _LOST and self._tracker.hand is not None:
                     self._state = "no frames come"
                     self._targets.put(Target(None, now, now))
