@@ -155,50 +155,59 @@ def model_grips(
         if np.isnan(forces[k]):
             continue
         model = demonstration_spec(d, body).compile()
-        touch, mix = Touch(model, body), coordinates_per_target(model, targets.shape[-1])[:, NUM_WRIST:]
+        press = Press(Touch(model, body), body, float(forces[k]), gains, wrap_torque)
         coordinates = hand_coordinates(model, targets[k])
-        closed = wrap_torque * closing_directions(body) * gains.force_limit / gains.stiffness if wrap_torque else None
-        opposing = np.isin(touch.fingers, body.opposing)
         for t in range(d.num_frames):
-            touch.place(coordinates[t], d.object_pose[t])
-            grips[k, t, NUM_WRIST:] = _offsets(touch, mix, opposing, float(forces[k]), gains, closed)
+            press.touch.place(coordinates[t], d.object_pose[t])
+            grips[k, t, NUM_WRIST:] = press.offsets()
         grips[k, d.num_frames :] = grips[k, d.num_frames - 1]
     return grips
 
 
-def _offsets(
-    touch: Touch,
-    mix: Float[np.ndarray, "m j"],
-    opposing: np.ndarray,
-    force: float,
-    gains: Gains,
-    closed: Float[np.ndarray, "j"] | None,
-) -> Float[np.ndarray, "j"]:
-    """Offsets (rad) of the actuated joints where hand and object are now; `closed` are those of a hand that wraps."""
-    found = list(touch.nearest())
-    if not found:
-        return np.zeros(mix.shape[1])
-    numbers = np.array([number for number, *_ in found])
-    gaps = np.array([gap for _, gap, *_ in found])
-    touching = expit((NEAR - gaps) / _SHARP)
-    rows = np.stack([inward @ touch.jacobian(number, point) @ mix for number, _, point, inward in found])
-    fingers = np.array(touch.fingers)[numbers]
-    names = list(dict.fromkeys(touch.fingers))
-    of_finger = (fingers[:, None] == np.array(names)).astype(float)  # (links, fingers)
-    leads = np.array([opposing[touch.fingers.index(name)] for name in names])
-    phalanges = touching @ of_finger  # how many of each finger touch
-    touches = np.minimum(phalanges, 1.0)
-    rest, ahead = (touches / max(float(touches[side].sum()), 1.0) for side in (~leads, leads))
-    of_hand = np.where(leads, ahead, rest)
-    share = touching * (of_finger @ (of_hand / np.maximum(phalanges, 1.0)))
-    torque = (force * share) @ rows
-    closing = rows * touching[:, None]
-    square = closing @ closing.T + _DAMPING**2 * np.eye(len(rows))
-    step = closing.T @ np.linalg.solve(square, gaps * touching)
-    pressed = step + np.clip(torque, -gains.force_limit, gains.force_limit) / gains.stiffness
-    others = len(set(np.array(touch.fingers)[~opposing]))
-    if closed is None or others < 2:
-        return pressed
-    around = np.clip(phalanges - 1.0, 0.0, 1.0)[~leads].sum()
-    wraps = expit((around - min(WRAPS, others - 0.5)) / SURE)
-    return (1 - wraps) * pressed + wraps * closed
+class Press:
+    """How the fingers of one hand press on the object.
+
+    Args:
+        touch: where they are.
+        body: the hand.
+        force: of its pads (N).
+        gains: of its joints.
+        wrap_torque: see `model_grips`.
+    """
+
+    def __init__(self, touch: Touch, body: Body, force: float, gains: Gains, wrap_torque: float):
+        self.touch, self._force, self._gains = touch, force, gains
+        self._mix = coordinates_per_target(touch.model, body.num_targets)[:, NUM_WRIST:]
+        self._closed = wrap_torque * closing_directions(body) * gains.force_limit / gains.stiffness
+        self._opposing = body.opposing
+        self._others = len({*touch.fingers} - {"", *body.opposing})
+
+    def offsets(self) -> Float[np.ndarray, "j"]:
+        """Of the actuated joints (rad), where hand and object are now."""
+        touch, gains = self.touch, self._gains
+        found = [near for near in touch.nearest() if touch.fingers[near[0]]]  # the palm is moved by no joint
+        if not found:
+            return np.zeros(self._mix.shape[1])
+        numbers = np.array([number for number, *_ in found])
+        gaps = np.array([gap for _, gap, *_ in found])
+        touching = expit((NEAR - gaps) / _SHARP)
+        rows = np.stack([inward @ touch.jacobian(number, point) @ self._mix for number, _, point, inward in found])
+        fingers = np.array(touch.fingers)[numbers]
+        names = list(dict.fromkeys(finger for finger in touch.fingers if finger))
+        of_finger = (fingers[:, None] == np.array(names)).astype(float)  # (links, fingers)
+        leads = np.isin(names, self._opposing)
+        phalanges = touching @ of_finger  # how many of each finger touch
+        touches = np.minimum(phalanges, 1.0)
+        rest, ahead = (touches / max(float(touches[side].sum()), 1.0) for side in (~leads, leads))
+        of_hand = np.where(leads, ahead, rest)
+        share = touching * (of_finger @ (of_hand / np.maximum(phalanges, 1.0)))
+        torque = (self._force * share) @ rows
+        closing = rows * touching[:, None]
+        square = closing @ closing.T + _DAMPING**2 * np.eye(len(rows))
+        step = closing.T @ np.linalg.solve(square, gaps * touching)
+        pressed = step + np.clip(torque, -gains.force_limit, gains.force_limit) / gains.stiffness
+        if not self._closed.any() or self._others < 2:
+            return pressed
+        around = np.clip(phalanges - 1.0, 0.0, 1.0)[~leads].sum()
+        wraps = expit((around - min(WRAPS, self._others - 0.5)) / SURE)
+        return (1 - wraps) * pressed + wraps * self._closed

@@ -4,8 +4,9 @@ The object goes its way as demonstrated. A robot's hand is larger or smaller tha
 other knuckles: wrists cannot coincide, contacts can. First grasps are sought, by damped least squares from several
 postures: each robot finger whose person's finger touches lies with its last link on the object at the same place, no
 other link is inside the object, none in table or support, and the wrist is turned as the person's where that leaves a
-choice. From the best that could hold the object the wrist then goes as the person's went, and fingers are where the
-person's pads were, but off the object until they touch it.
+choice. From a grasp that could hold the object the wrist then goes as the person's went, and fingers are where the
+person's pads were, but off the object until they touch it. The best few grasps are rehearsed that way in simulation,
+and the one is taken with which the object stays nearest to its demonstrated way.
 """
 
 from collections.abc import Sequence
@@ -20,6 +21,7 @@ from envs.demonstrations.on_robot.follow import follow
 from envs.demonstrations.on_robot.grasp import ALONG, Grasp, find_grasps
 from envs.demonstrations.on_robot.left_out import NO_CLOSURE, OUT_OF_REACH, LeftOut
 from envs.demonstrations.on_robot.robot_scene import RobotScene
+from envs.demonstrations.on_robot.trial import Rehearsal, rehearse, slip
 from envs.scene import NUM_WRIST
 from mjx_hand.bodies.body import Body
 from mjx_hand.errors import InputError
@@ -31,6 +33,8 @@ from mjx_hand.rigid.rigid_hand import RigidHand
 _DEPTH = 0.004  # m that a link may be inside the object
 _OFF = 0.004  # m that a finger may be off the surface where it should touch
 _TOUCHES = 0.002  # m off the surface at which a link bears
+_REHEARSED = 4  # grasps at most
+_NEAR, _STRAIGHT = 0.01, 0.25  # m, rad from the demonstrated pose, within which no better one is sought
 
 
 @dataclass(frozen=True)
@@ -41,11 +45,13 @@ class Brought:
         demonstration: with the robot's motion.
         fingers: of the robot that touch.
         grasp: how good the grasp is.
+        rehearsal: how the object went with it.
     """
 
     demonstration: Demonstration
     fingers: tuple[str, ...]
     grasp: Grasp
+    rehearsal: Rehearsal
 
 
 def on_robot(demonstration: Demonstration, person: RigidHand, body: Body) -> Brought:
@@ -61,12 +67,16 @@ def on_robot(demonstration: Demonstration, person: RigidHand, body: Body) -> Bro
             f"{demonstration.motion.side} hand's description"
         )
     scene = RobotScene(demonstration, person, body)
-    grasp = _first_possible(scene, find_grasps(scene))
-    rows = follow(scene, grasp.targets)
-    turn = Rotation.from_matrix(scene.base) * Rotation.from_euler("XYZ", rows[:, 3:NUM_WRIST])
-    quaternion = turn.as_quat(scalar_first=True)
-    made = moved_by(body, demonstration, rows[:, NUM_WRIST:], rows[:, :3] @ scene.base.T, quaternion)
-    return Brought(made, scene.pads.fingers, grasp)
+    tried = []
+    for grasp in _possible(scene, find_grasps(scene))[:_REHEARSED]:
+        rows = follow(scene, grasp.targets)
+        turn = Rotation.from_matrix(scene.base) * Rotation.from_euler("XYZ", rows[:, 3:NUM_WRIST])
+        quaternion = turn.as_quat(scalar_first=True)
+        made = moved_by(body, demonstration, rows[:, NUM_WRIST:], rows[:, :3] @ scene.base.T, quaternion)
+        tried.append(Brought(made, scene.pads.fingers, grasp, rehearse(made, body)))
+        if tried[-1].rehearsal.moved < _NEAR and tried[-1].rehearsal.turned < _STRAIGHT:
+            break
+    return max(tried, key=lambda brought: brought.rehearsal.goodness)
 
 
 def moved_by(
@@ -90,15 +100,19 @@ def moved_by(
     return replace(demonstration, motion=motion, tracked=None)  # a tracker saw the person's hand
 
 
-def _first_possible(scene: RobotScene, grasps: Sequence[Grasp]) -> Grasp:
-    """The best grasp with which the hand can hold the object; where there is none, LeftOut with the best's reason."""
-    refused = []
+def _possible(scene: RobotScene, grasps: Sequence[Grasp]) -> list[Grasp]:
+    """The grasps with which the hand can hold the object, what slips least first; where there is none, LeftOut with the
+    first one's reason."""
+    held, refused = [], []
     for grasp in grasps:
         fault = _fault(scene, grasp)
         if fault is None:
-            return grasp
-        refused.append(fault)
-    raise refused[0]
+            held.append((slip(scene, grasp.targets), grasp))
+        else:
+            refused.append(fault)
+    if not held:
+        raise refused[0]
+    return [grasp for _, grasp in sorted(held, key=lambda each: each[0])]
 
 
 def _fault(scene: RobotScene, grasp: Grasp) -> LeftOut | None:

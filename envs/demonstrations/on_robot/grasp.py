@@ -1,6 +1,7 @@
 """One grasp of a robot hand, where and as a person's: damped least squares from several postures."""
 
 import itertools
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ _TIP = 0.05  # m that weighs 1 of a tip that touches nothing
 _SAME_FACE = 0.8  # cosine between the person's way into the object and the robot's
 _ALONG_WRAP, _AROUND = 0.02, 0.01  # m that weigh 1 of a hand that wraps: along the surface, and of further links off it
 _BENT = (0.15, 0.3, 0.45, 0.6)  # of the joints' ranges, at which a search begins
+_OPPOSING_BENT = (0.2, 0.5, 0.8)  # of those of fingers that oppose the others
 _IDLE_BENT = (0.3, 0.9)  # of those of fingers that touch nothing
 _STEPS = 60
 
@@ -88,9 +90,9 @@ def find_grasps(scene: RobotScene) -> list[Grasp]:
 
     scene.put_ground(frame)
     found: list[tuple[float, np.ndarray]] = []
-    idle = idle_targets(scene)
-    for bent, idle_bent in itertools.product(_BENT, _IDLE_BENT if idle.any() else (0.0,)):
-        start = scene.low + np.where(idle, idle_bent, bent) * (scene.high - scene.low)
+    idle, opposing = still_targets(scene, scene.pads.fingers), ~still_targets(scene, scene.body.opposing)
+    for bent, ahead, aside in itertools.product(_BENT, _OPPOSING_BENT, _IDLE_BENT if idle.any() else (0.0,)):
+        start = scene.low + np.where(idle, aside, np.where(opposing, ahead, bent)) * (scene.high - scene.low)
         start[:NUM_WRIST] = wrist
         scene.place(start, frame)
         tips = np.mean([scene.touch.data.site_xpos[scene.sites[finger]] for finger in pads.fingers], axis=0)
@@ -110,8 +112,8 @@ def find_grasps(scene: RobotScene) -> list[Grasp]:
     return grasps
 
 
-def idle_targets(scene: RobotScene) -> Bool[np.ndarray, "u"]:
-    """Which targets move no finger that touches: the joints of the others."""
+def still_targets(scene: RobotScene, fingers: Collection[str]) -> Bool[np.ndarray, "u"]:
+    """Which targets move none of these fingers: the joints of the others."""
     scene.place(scene.middle, scene.pads.grasp)
-    ends = [(scene.last[finger], scene.touch.data.site_xpos[scene.sites[finger]]) for finger in scene.pads.fingers]
+    ends = [(scene.last[finger], scene.touch.data.site_xpos[scene.sites[finger]]) for finger in fingers]
     return ~np.any(np.abs([scene.jacobian(link, tip) for link, tip in ends]) > 1e-9, axis=(0, 1))

@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from envs.demonstrations.load_env import env_of_set
-from envs.demonstrations.on_robot.bring import _first_possible, on_robot
-from envs.demonstrations.on_robot.grasp import find_grasps, idle_targets
+from envs.demonstrations.on_robot import bring
+from envs.demonstrations.on_robot.bring import _possible, on_robot
+from envs.demonstrations.on_robot.grasp import find_grasps, still_targets
 from envs.demonstrations.on_robot.least_squares import solve
 from envs.demonstrations.on_robot.left_out import NO_CLOSURE, NO_FINGERS, OUT_OF_REACH, LeftOut
 from envs.demonstrations.on_robot.pads import demonstrated_pads
 from envs.demonstrations.on_robot.robot_scene import RobotScene
+from envs.demonstrations.on_robot.trial import Rehearsal
 from envs.demonstrations.set_settings import SetSettings
 from envs.model_grip import NEAR
 from envs.reference import demonstrated_targets
@@ -161,27 +163,43 @@ def test_what_a_robot_cannot_do_is_left_out_with_the_reason(demonstrations, hand
     assert left_out.value.reason == NO_CLOSURE
 
 
-def test_the_best_grasp_that_can_hold_is_taken(demonstrations, hands, allegro):
-    """One that is inside the table is passed over; where none is left its reason is told."""
+def test_grasps_that_cannot_hold_are_passed_over(demonstrations, hands, allegro):
+    """One that is inside the table is; where none is left its reason is told. What slips least comes first."""
     scene = RobotScene(demonstrations[1], hands[1], allegro)
     grasps = find_grasps(scene)
-    assert _first_possible(scene, grasps) is grasps[0]
-    sunk = dataclasses.replace(grasps[0], sunk=0.01)
-    assert _first_possible(scene, [sunk, *grasps[1:]]) is not sunk
+    possible = _possible(scene, grasps)
+    assert len(possible) > 1
+    far = [bring.slip(scene, grasp.targets) for grasp in possible]
+    assert far == sorted(far)
+    sunk = dataclasses.replace(possible[0], sunk=0.01)
+    assert all(grasp is not sunk for grasp in _possible(scene, [sunk, possible[1]]))
     with pytest.raises(LeftOut, match="its links are 10 mm inside table or support") as left_out:
-        _first_possible(scene, [sunk])
+        _possible(scene, [sunk])
     assert left_out.value.reason == OUT_OF_REACH
+
+
+def test_the_grasp_that_is_best_in_rehearsal_is_taken(demonstrations, hands, allegro, monkeypatch):
+    """Of four at most, and no more are rehearsed once the object stays near; an object that is lost later is better
+    than one that is lost sooner, however far it strays."""
+    told = [Rehearsal(0.5, 0.02, 0.1), Rehearsal(1.0, 0.05, 0.4), Rehearsal(1.0, 0.05, 0.2), Rehearsal(0.9, 0.01, 0.0)]
+    for script, chosen, rehearsed in ((told, 2, 4), ([told[1], Rehearsal(1.0, 0.009, 0.2), *told], 1, 2)):
+        made = []
+        monkeypatch.setattr(bring, "follow", lambda scene, grasp: np.tile(grasp, (scene.demonstration.num_frames, 1)))
+        monkeypatch.setattr(bring, "rehearse", lambda d, body: made.append(d) or script[len(made) - 1])  # noqa: B023
+        found = on_robot(demonstrations[1], hands[1], allegro)
+        assert len(made) == rehearsed
+        assert found.demonstration is made[chosen]
+        assert found.rehearsal == script[chosen]
 
 
 def test_joints_of_fingers_that_touch_are_not_idle(demonstrations, hands, allegro):
     """A last link may hang on the joint itself, which then does not move its origin."""
-    body = dataclasses.replace(allegro)
-    scene = RobotScene(demonstrations[1], hands[1], body)
-    idle = idle_targets(scene)
+    scene = RobotScene(demonstrations[1], hands[1], allegro)
+    idle = still_targets(scene, FINGERS)
     assert idle.sum() == 4  # the ring finger's
     assert all(allegro.joints[k - 6].endswith(("8.0", "9.0", "10.0", "11.0")) for k in np.flatnonzero(idle))
     scene.last = {finger: k - 1 if finger == "index" else k for finger, k in scene.last.items()}  # a link on its joint
-    np.testing.assert_array_equal(idle_targets(scene), idle)
+    np.testing.assert_array_equal(still_targets(scene, FINGERS), idle)
 
 
 def test_a_hand_of_the_other_side_is_refused(demonstrations, hands, allegro):
