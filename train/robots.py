@@ -13,14 +13,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from envs.demonstrations.load_set import load_demonstrations
-from envs.demonstrations.on_robot.left_out import REASONS
-from envs.demonstrations.on_robot.robot_set import robot_set
+from envs.demonstrations.on_robot.bring import possible_grasps
+from envs.demonstrations.on_robot.left_out import REASONS, LeftOut
 from envs.demonstrations.twin_hands import twins
 from mjx_hand.bodies.robot_body import robot_body
 from mjx_hand.compile_cache import enable_compile_cache
 from mjx_hand.errors import InputError
 from mjx_hand.files.npz_archive import replacing
 from mjx_hand.motion.demonstration import Demonstration
+from mjx_hand.progress import counter
 from mjx_hand.view.report import Table
 from train.evaluate import show
 from train.settings.config import Config, compose
@@ -59,11 +60,17 @@ def possible(hand: str, demonstrations: Sequence[Demonstration]) -> list[Possibl
     """
     body = robot_body(hand)
     found = []
-    for grasp in dict.fromkeys(d.grasp for d in demonstrations):
-        of_type = [d for d in demonstrations if d.grasp == grasp]
-        made = robot_set(of_type, twins(of_type), body)
-        told = {k: (error.reason, str(error)) for k, error in made.left_out.items()}
-        found.append(Possible(body.name, grasp, len(of_type), told))
+    with counter(len(demonstrations), f"demonstrations on {body.name}") as advance:
+        for grasp in dict.fromkeys(d.grasp for d in demonstrations):
+            of_type = [d for d in demonstrations if d.grasp == grasp]
+            told = {}
+            for k, (d, person) in enumerate(zip(of_type, twins(of_type), strict=True)):
+                try:
+                    possible_grasps(d, person, body)
+                except LeftOut as error:
+                    told[k] = error.reason, str(error)
+                advance(1)
+            found.append(Possible(body.name, grasp, len(of_type), told))
     return found
 
 

@@ -9,7 +9,6 @@ person's pads were, but off the object until they touch it. The best few grasps 
 and the one is taken with which the object stays nearest to its demonstrated way.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,6 +57,25 @@ def on_robot(demonstration: Demonstration, person: RigidHand, body: Body) -> Bro
     """Bring a person's demonstration onto a robot hand.
 
     Raises:
+        InputError, LeftOut: as `possible_grasps`.
+    """
+    scene, grasps = possible_grasps(demonstration, person, body)
+    tried = []
+    for grasp in sorted(grasps, key=lambda each: slip(scene, each.targets))[:_REHEARSED]:
+        rows = follow(scene, grasp.targets)
+        turn = Rotation.from_matrix(scene.base) * Rotation.from_euler("XYZ", rows[:, 3:NUM_WRIST])
+        quaternion = turn.as_quat(scalar_first=True)
+        made = moved_by(body, demonstration, rows[:, NUM_WRIST:], rows[:, :3] @ scene.base.T, quaternion)
+        tried.append(Brought(made, scene.pads.fingers, grasp, rehearse(made, body)))
+        if tried[-1].rehearsal.moved < _NEAR and tried[-1].rehearsal.turned < _STRAIGHT:
+            break
+    return max(tried, key=lambda brought: brought.rehearsal.goodness)
+
+
+def possible_grasps(demonstration: Demonstration, person: RigidHand, body: Body) -> tuple[RobotScene, list[Grasp]]:
+    """The grasps with which a robot could hold the object as a person does, and the scene that they are of.
+
+    Raises:
         InputError: a hand of the other side.
         LeftOut: fewer than two of the fingers that touch, or no posture in which they do and hold the object.
     """
@@ -67,16 +85,16 @@ def on_robot(demonstration: Demonstration, person: RigidHand, body: Body) -> Bro
             f"{demonstration.motion.side} hand's description"
         )
     scene = RobotScene(demonstration, person, body)
-    tried = []
-    for grasp in _possible(scene, find_grasps(scene))[:_REHEARSED]:
-        rows = follow(scene, grasp.targets)
-        turn = Rotation.from_matrix(scene.base) * Rotation.from_euler("XYZ", rows[:, 3:NUM_WRIST])
-        quaternion = turn.as_quat(scalar_first=True)
-        made = moved_by(body, demonstration, rows[:, NUM_WRIST:], rows[:, :3] @ scene.base.T, quaternion)
-        tried.append(Brought(made, scene.pads.fingers, grasp, rehearse(made, body)))
-        if tried[-1].rehearsal.moved < _NEAR and tried[-1].rehearsal.turned < _STRAIGHT:
-            break
-    return max(tried, key=lambda brought: brought.rehearsal.goodness)
+    possible, faults = [], []
+    for grasp in find_grasps(scene):
+        fault = _fault(scene, grasp)
+        if fault is None:
+            possible.append(grasp)
+        else:
+            faults.append(fault)
+    if not possible:
+        raise faults[0]
+    return scene, possible
 
 
 def moved_by(
@@ -98,21 +116,6 @@ def moved_by(
         joint_names=body.joints,
     )
     return replace(demonstration, motion=motion, tracked=None)  # a tracker saw the person's hand
-
-
-def _possible(scene: RobotScene, grasps: Sequence[Grasp]) -> list[Grasp]:
-    """The grasps with which the hand can hold the object, what slips least first; where there is none, LeftOut with the
-    first one's reason."""
-    held, refused = [], []
-    for grasp in grasps:
-        fault = _fault(scene, grasp)
-        if fault is None:
-            held.append((slip(scene, grasp.targets), grasp))
-        else:
-            refused.append(fault)
-    if not held:
-        raise refused[0]
-    return [grasp for _, grasp in sorted(held, key=lambda each: each[0])]
 
 
 def _fault(scene: RobotScene, grasp: Grasp) -> LeftOut | None:

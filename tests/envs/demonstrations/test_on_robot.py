@@ -8,8 +8,8 @@ import pytest
 
 from envs.demonstrations.load_env import env_of_set
 from envs.demonstrations.on_robot import bring
-from envs.demonstrations.on_robot.bring import _possible, on_robot
-from envs.demonstrations.on_robot.grasp import find_grasps, still_targets
+from envs.demonstrations.on_robot.bring import on_robot, possible_grasps
+from envs.demonstrations.on_robot.grasp import still_targets
 from envs.demonstrations.on_robot.least_squares import solve
 from envs.demonstrations.on_robot.left_out import NO_CLOSURE, NO_FINGERS, OUT_OF_REACH, LeftOut
 from envs.demonstrations.on_robot.pads import demonstrated_pads
@@ -163,19 +163,30 @@ def test_what_a_robot_cannot_do_is_left_out_with_the_reason(demonstrations, hand
     assert left_out.value.reason == NO_CLOSURE
 
 
-def test_grasps_that_cannot_hold_are_passed_over(demonstrations, hands, allegro):
-    """One that is inside the table is; where none is left its reason is told. What slips least comes first."""
-    scene = RobotScene(demonstrations[1], hands[1], allegro)
-    grasps = find_grasps(scene)
-    possible = _possible(scene, grasps)
+def test_grasps_that_cannot_hold_are_passed_over(demonstrations, hands, allegro, monkeypatch):
+    """One that is inside the table is; where none is left the best's reason is told."""
+    _, possible = possible_grasps(demonstrations[1], hands[1], allegro)
     assert len(possible) > 1
-    far = [bring.slip(scene, grasp.targets) for grasp in possible]
-    assert far == sorted(far)
     sunk = dataclasses.replace(possible[0], sunk=0.01)
-    assert all(grasp is not sunk for grasp in _possible(scene, [sunk, possible[1]]))
+    monkeypatch.setattr(bring, "find_grasps", lambda scene: [sunk, possible[1]])
+    assert possible_grasps(demonstrations[1], hands[1], allegro)[1] == [possible[1]]
+    monkeypatch.setattr(bring, "find_grasps", lambda scene: [sunk])
     with pytest.raises(LeftOut, match="its links are 10 mm inside table or support") as left_out:
-        _possible(scene, [sunk])
+        possible_grasps(demonstrations[1], hands[1], allegro)
     assert left_out.value.reason == OUT_OF_REACH
+
+
+def test_what_slips_least_is_rehearsed_first(demonstrations, hands, allegro, monkeypatch):
+    slips, made = [], []
+    monkeypatch.setattr(bring, "slip", lambda scene, targets: slips.append(targets) or len(slips) % 3)
+    monkeypatch.setattr(bring, "follow", lambda scene, grasp: made.append(grasp) or np.tile(grasp, (len(way), 1)))
+    monkeypatch.setattr(bring, "rehearse", lambda d, body: Rehearsal(0.5, 0.1, 0.0))
+    way = demonstrations[1].object_pose
+    on_robot(demonstrations[1], hands[1], allegro)
+    assert len(slips) > 4
+    order = sorted(range(len(slips)), key=lambda k: (k + 1) % 3)[:4]
+    for targets, k in zip(made, order, strict=True):
+        np.testing.assert_array_equal(targets, slips[k])
 
 
 def test_the_grasp_that_is_best_in_rehearsal_is_taken(demonstrations, hands, allegro, monkeypatch):
