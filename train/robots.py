@@ -24,6 +24,7 @@ from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.progress import counter
 from mjx_hand.view.report import Table
 from train.evaluate import show
+from train.experiments import listed
 from train.settings.config import Config, compose
 
 NAME = "robots"
@@ -109,13 +110,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     argv = sys.argv[1:] if argv is None else argv
     own = {key: value for key, _, value in (argument.partition("=") for argument in argv) if key in ("hands", "first")}
     try:
-        hands = [name.strip(" '\"") for name in own.get("hands", "allegro").strip("[]").split(",")]
-        first = own.get("first", "")
-        if not all(hands) or (first and not (first.isdigit() and int(first) > 0)):
-            raise InputError(f"hands={own.get('hands')} first={first}: give as in hands=[allegro,shadow] first=8")
+        hands, first = listed(own, "hands", ("allegro",)), own.get("first", "")
+        if first and not (first.isdigit() and int(first) > 0):
+            raise InputError(f"first={first}: give how many of each type to take, as in first=8")
         config = compose([argument for argument in argv if argument.partition("=")[0] not in own])
         enable_compile_cache()
-        written = run(list(dict.fromkeys(hands)), int(first) if first else None, config)
+        written = run(hands, int(first) if first else None, config)
     except (InputError, OSError) as error:
         print(f"{NAME}: {InputError(error) if isinstance(error, OSError) else error}", file=sys.stderr)
         return 2
