@@ -73,7 +73,7 @@ class Pipeline:
             threading.Thread(target=self._guarded, args=(work,), daemon=True, name=f"live {name}").start()
 
     def wait(self, seconds: float | None) -> None:
-        """Return when the source has no more, or after that time.
+        """Return when the source's last frame has been tracked, when all is stopped, or after that time (s).
 
         Raises:
             InputError: the source could not be used.
@@ -85,6 +85,7 @@ class Pipeline:
     def stop(self) -> None:
         """End all threads."""
         self._stop.set()
+        self._over.set()
 
     def wish(self, what: str) -> None:
         """Somebody wants "reset" or "record"; done at the next physics step."""

@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 
 from envs.demonstrations.load_set import PARTS, SEALED, part_digest
+from envs.demonstrations.on_robot import robot_set
 from envs.demonstrations.set_settings import fingerprint, sealed_folder, set_folder
 from envs.evaluation.evaluate import Evaluation
 from envs.evaluation.people import people_of, person_scores
 from envs.grasps import grasp_names, grasp_type
+from mjx_hand.bodies.human_body import HUMAN
 from mjx_hand.files.digests import digest
 from mjx_hand.files.npz_archive import replacing
 from train.experiment.evaluate_seeds import POLICY, Results, shared_folder
@@ -122,6 +124,8 @@ def evaluation_fingerprint(configs: Sequence[Config]) -> str:
             sets += [part_digest(config.data.folder, part) for part in PARTS]
         forces = [grasp_type(name).grip_force for name in grasp_names()]
         told = [config.name, config.part, config.engine, config.seed, sets, forces, parts]
+        if config.hand != HUMAN:
+            told.append([config.hand, robot_set.METHOD])
         pieces.append(json.dumps(told, sort_keys=True).encode())
         policy = Path(config.checkpoint) if config.checkpoint else Path(config.out) / "best.npz"
         for path in (policy, Path(config.out) / "curve.csv"):

@@ -5,8 +5,9 @@ other knuckles: wrists cannot coincide, contacts can. First grasps are sought, b
 postures: each robot finger whose person's finger touches lies with its last link on the object at the same place, no
 other link is inside the object, none in table or support, and the wrist is turned as the person's where that leaves a
 choice. From a grasp that could hold the object the wrist then goes as the person's went, and fingers are where the
-person's pads were, but off the object until they touch it. The best few grasps are rehearsed that way in simulation,
-and the one is taken with which the object stays nearest to its demonstrated way.
+person's pads were, but off the object until they touch it. The best few grasps are rehearsed that way in simulation, up
+to the first with which the object stays near its demonstrated way; where none does, the one that holds it longest and
+nearest is taken.
 """
 
 from dataclasses import dataclass
@@ -33,7 +34,7 @@ _DEPTH = 0.004  # m that a link may be inside the object
 _OFF = 0.004  # m that a finger may be off the surface where it should touch
 _TOUCHES = 0.002  # m off the surface at which a link bears
 _REHEARSED = 4  # grasps at most
-_NEAR, _STRAIGHT = 0.01, 0.25  # m, rad from the demonstrated pose, within which no better one is sought
+_NEAR_ENOUGH, _TURNED_LITTLE = 0.01, 0.25  # m, rad from the demonstrated pose, within which no better one is sought
 
 
 @dataclass(frozen=True)
@@ -67,9 +68,9 @@ def on_robot(demonstration: Demonstration, person: RigidHand, body: Body) -> Bro
         quaternion = turn.as_quat(scalar_first=True)
         made = moved_by(body, demonstration, rows[:, NUM_WRIST:], rows[:, :3] @ scene.base.T, quaternion)
         tried.append(Brought(made, scene.pads.fingers, grasp, rehearse(made, body)))
-        if tried[-1].rehearsal.moved < _NEAR and tried[-1].rehearsal.turned < _STRAIGHT:
+        if tried[-1].rehearsal.moved < _NEAR_ENOUGH and tried[-1].rehearsal.turned < _TURNED_LITTLE:
             break
-    return max(tried, key=lambda brought: brought.rehearsal.goodness)
+    return max(tried, key=lambda brought: brought.rehearsal.score)
 
 
 def possible_grasps(demonstration: Demonstration, person: RigidHand, body: Body) -> tuple[RobotScene, list[Grasp]]:

@@ -21,6 +21,7 @@ _BENT = (0.15, 0.3, 0.45, 0.6)  # of the joints' ranges, at which a search begin
 _OPPOSING_BENT = (0.2, 0.5, 0.8)  # of those of fingers that oppose the others
 _IDLE_BENT = (0.3, 0.9)  # of those of fingers that touch nothing
 _STEPS = 60
+_SAME = 0.02  # m, rad between all targets of two grasps that are one
 
 
 @dataclass(frozen=True)
@@ -91,16 +92,20 @@ def find_grasps(scene: RobotScene) -> list[Grasp]:
     scene.put_ground(frame)
     found: list[tuple[float, np.ndarray]] = []
     idle, opposing = still_targets(scene, scene.pads.fingers), ~still_targets(scene, scene.body.opposing)
-    for bent, ahead, aside in itertools.product(_BENT, _OPPOSING_BENT, _IDLE_BENT if idle.any() else (0.0,)):
-        start = scene.low + np.where(idle, aside, np.where(opposing, ahead, bent)) * (scene.high - scene.low)
+    bents = itertools.product(_BENT, _OPPOSING_BENT, _IDLE_BENT if idle.any() else (0.0,))
+    for bent, opposing_bent, idle_bent in bents:
+        share = np.where(idle, idle_bent, np.where(opposing, opposing_bent, bent))
+        start = scene.low + share * (scene.high - scene.low)
         start[:NUM_WRIST] = wrist
         scene.place(start, frame)
         tips = np.mean([scene.touch.data.site_xpos[scene.sites[finger]] for finger in pads.fingers], axis=0)
         start[:3] += scene.base.T @ (places.mean(axis=0) - tips)
         targets, cost = solve(equations, start, scene.low, scene.high, _STEPS)
         found.append((cost, targets))
-    grasps = []
+    grasps: list[Grasp] = []
     for _, targets in sorted(found, key=lambda each: each[0]):
+        if any(np.abs(targets - grasp.targets).max() < _SAME for grasp in grasps):
+            continue  # many searches end in the same grasp
         scene.place(targets, frame)
         near = scene.near()
         off = np.array([np.linalg.norm(near[k][1] - place) for k, place in zip(wanted, places, strict=True)])

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from envs.demonstrations.on_robot.left_out import shared_pads
 from envs.demonstrations.on_robot.pads import demonstrated_pads
 from envs.model_grip import Touch
+from envs.physics.solver import gauss_seidel
 from envs.scene import base_rotation, demonstration_spec, wrist_coordinates
 from mjx_hand.bodies.body import Body
 from mjx_hand.bodies.coordinates import coordinates_per_target, hand_coordinates
@@ -30,6 +31,7 @@ class RobotScene:
         low, high, middle: limits of the targets (wrist and actuated joints), and what lies between them.
         last: each finger's last link, "" the palm's, by its number in `touch`.
         sites: the finger tips'.
+        trial_model: for simulations of grasps in the air: the hand meets the object and itself.
     """
 
     def __init__(self, demonstration: Demonstration, person: RigidHand, body: Body):
@@ -39,6 +41,7 @@ class RobotScene:
         motion = demonstration.motion
         self.wrist = wrist_coordinates(motion.wrist_position, motion.wrist_quaternion, self.base)
         self.model = demonstration_spec(demonstration, body).compile()
+        (self.trial_model,) = gauss_seidel([demonstration_spec(demonstration, body, contacts="self").compile()])
         self.touch = Touch(self.model, body, palm=True)
         self.count = body.num_targets
         self.mix = coordinates_per_target(self.model, self.count)

@@ -1,13 +1,14 @@
 """Sets of demonstrations for a robot hand, kept from one start to the next."""
 
+import dataclasses
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from envs.demonstrations.on_robot.bring import moved_by, on_robot
 from envs.demonstrations.on_robot.left_out import LeftOut
+from envs.demonstrations.on_robot.trial import Rehearsal
 from mjx_hand.bodies.body import Body
 from mjx_hand.bodies.body_places import body_model
 from mjx_hand.errors import InputError
@@ -16,20 +17,23 @@ from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.progress import counter
 from mjx_hand.rigid.rigid_hand import RigidHand
 
+METHOD = 2  # how references come about: counted up where they change, so that results on others are made anew
 _MOTION = ("angles", "wrist_position", "wrist_quaternion")
 
 
-@dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True)
 class RobotSet:
     """What of a set a robot can do.
 
     Attributes:
         done: the demonstrations on the robot, by their numbers in the set.
         left_out: why it cannot do the others, by theirs.
+        rehearsals: how the object went in simulation, without a policy, in those that it can do.
     """
 
     done: dict[int, Demonstration]
     left_out: dict[int, LeftOut]
+    rehearsals: dict[int, Rehearsal]
 
 
 def robot_set(demonstrations: Sequence[Demonstration], people: Sequence[RigidHand], body: Body) -> RobotSet:
@@ -49,27 +53,31 @@ def robot_set(demonstrations: Sequence[Demonstration], people: Sequence[RigidHan
         with counter(len(demonstrations), f"demonstrations on {body.name}") as advance:
             for k, (d, person) in enumerate(zip(demonstrations, people, strict=True)):
                 try:
-                    motion = on_robot(d, person, body).demonstration.motion
-                    arrays |= {f"{name}.{k}": getattr(motion, name) for name in _MOTION}
+                    brought = on_robot(d, person, body)
+                    arrays |= {f"{name}.{k}": getattr(brought.demonstration.motion, name) for name in _MOTION}
+                    arrays[f"rehearsal.{k}"] = np.array(dataclasses.astuple(brought.rehearsal))
                 except LeftOut as error:
                     arrays[f"left out.{k}"] = np.array([error.reason, str(error)])
                 advance(1)
         return arrays
 
     arrays = cached(compute, "on a robot", list(demonstrations), body.name, model_bytes(body_model(body)))
-    done, left_out = {}, {}
+    done, left_out, rehearsals = {}, {}, {}
     for k, d in enumerate(demonstrations):
         if f"left out.{k}" in arrays:
             left_out[k] = LeftOut(*(str(text) for text in arrays[f"left out.{k}"]))
         else:
             done[k] = moved_by(body, d, *(np.asarray(arrays[f"{name}.{k}"]) for name in _MOTION))
-    return RobotSet(done, left_out)
+            rehearsals[k] = Rehearsal(*arrays[f"rehearsal.{k}"].tolist())
+    return RobotSet(done, left_out, rehearsals)
 
 
 def robot_demonstrations(
     demonstrations: Sequence[Demonstration], people: Sequence[RigidHand], body: Body
 ) -> list[Demonstration]:
     """The demonstrations on a robot hand; those that it cannot do are left out, and said with the reason.
+
+    Those of which the object is lost in rehearsal stay, as a policy may hold it; how many they are is said.
 
     Raises:
         InputError: as `robot_set`, or it can do none of them.
@@ -81,4 +89,8 @@ def robot_demonstrations(
         if not made.done:
             raise InputError(f"{body.name} can do none of {len(demonstrations)} demonstrations: {first}")
         print(f"{body.name}: {count} of {of_type} demonstrations of {grasp} left out: {first}", flush=True)
+    lost = Counter(demonstrations[k].grasp for k, rehearsal in made.rehearsals.items() if rehearsal.until < 1)
+    for grasp, count in lost.items():
+        of_type = sum(demonstrations[k].grasp == grasp for k in made.done)
+        print(f"{body.name}: without a policy {count} of {of_type} objects of {grasp} are lost on the way", flush=True)
     return list(made.done.values())

@@ -2,7 +2,10 @@
 
 Distances do not tell. Of grasps whose fingers are all where they should be, some turn the object as the fingers close,
 some push it out of the hand, some meet it otherwise on the way. Candidates of grasp generators are tried in simulation
-for the same reason, as by pulling from six sides (DexGraspNet, https://arxiv.org/abs/2210.02697).
+for the same reason, as with gravity along six directions (DexGraspNet, https://arxiv.org/abs/2210.02697).
+
+All grasps are tried with the same settings, whatever the task of the environment that they are for: so what a robot's
+reference is does not change with a task's options.
 """
 
 from dataclasses import dataclass
@@ -10,24 +13,27 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.on_robot.robot_scene import RobotScene
 from envs.grasps import Pads, grasp_names, grasp_type
-from envs.grip_force import grip_force_of
+from envs.grip_force import RECORDED, grip_force_of
 from envs.model_grip import Press
+from envs.physics.native import DIVERGED
 from envs.physics.solver import gauss_seidel
 from envs.reference import make_reference
 from envs.scene import NUM_WRIST, TIMESTEP, demonstration_spec
-from envs.task import Task
+from envs.task import Task, check_rate
 from mjx_hand.bodies.body import Body
 from mjx_hand.bodies.coordinates import hand_coordinates
 from mjx_hand.motion.demonstration import Demonstration
 
 _GRAVITY = 9.81  # m/s^2
-_CLOSES, _PULLED = 0.1, 0.4  # s
-_LEVER = 0.05  # m by which a turn counts as a way
-LOST = 0.1  # m from where it should be, where an object is lost
-_FAR, _TURNED = 0.02, 0.5  # m, rad that count alike
+_CLOSING_TIME, _PULLING_TIME = 0.1, 0.4  # s
+_LEVER = 0.05  # m: a turn of 1 rad counts as this distance
+_LOST = 0.1  # m from its demonstrated place, where an object is lost: as far as CHORD allows
+_DISTANCE, _ANGLE = 0.02, 0.5  # m, rad that weigh the same
+_STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
 @dataclass(frozen=True)
@@ -35,7 +41,7 @@ class Rehearsal:
     """How an object went with a robot's demonstration.
 
     Attributes:
-        until: share of the demonstration before it was lost.
+        until: share of the demonstration before the object was 10 cm off; 1 where it never was.
         moved, turned: how far it was from its demonstrated pose at most, until then (m, rad).
     """
 
@@ -44,53 +50,72 @@ class Rehearsal:
     turned: float
 
     @property
-    def goodness(self) -> tuple[float, float]:
+    def score(self) -> tuple[float, float]:
         """Higher is better: held longer, then nearer to the demonstrated pose."""
-        return self.until, -self.moved / _FAR - self.turned / _TURNED
+        return self.until, -self.moved / _DISTANCE - self.turned / _ANGLE
 
 
 def pressing_force(demonstration: Demonstration) -> float:
-    """The force (N) with which pads press in a trial: that with which demonstrations of the grasp type are made, or,
-    of no type, what the object's weight asks for."""
+    """The force (N) with which pads press in a trial.
+
+    That with which people's demonstrations of the grasp type are made; of no type, what the object's weight asks for.
+    """
     if demonstration.grasp not in grasp_names():
         return grip_force_of(demonstration.object.mass, demonstration.object.friction)
     grasp = grasp_type(demonstration.grasp)
     return grasp.closing.force if isinstance(grasp.closing, Pads) else grasp.grip_force
 
 
+def trial_task(demonstration: Demonstration) -> Task:
+    """The task of a rehearsal; of a recording as its experiments have it, the hand passing through table and itself."""
+    force = pressing_force(demonstration)
+    if demonstration.grasp == RECORDED:
+        return Task(grip_force=force, contacts="object", wrap_torque=0.0)
+    return Task(grip_force=force)
+
+
 def slip(scene: RobotScene, targets: Float[np.ndarray, "u"]) -> float:
-    """How far (m) the object goes, on average, as the hand closes and its weight then pulls from each of six sides.
+    """How far (m) the object slips, on average, as the hand closes and gravity then acts along each of six directions.
 
     Args:
         scene: the robot's.
-        targets: of wrist and actuated joints.
+        targets: of wrist and actuated joints (m, rad).
+
+    Returns:
+        Infinity where the simulation diverges.
     """
-    model, data, frame = scene.model, mujoco.MjData(scene.model), scene.pads.grasp
-    scene.place(targets, frame)
-    press = Press(scene.touch, scene.body, pressing_force(scene.demonstration), scene.body.gains, Task().wrap_torque)
+    task = trial_task(scene.demonstration)
+    scene.place(targets, scene.pads.grasp)
+    press = Press(scene.touch, scene.body, pressing_force(scene.demonstration), scene.body.gains, task.wrap_torque)
     start = scene.touch.data.qpos.copy()
-    told = targets + np.pad(press.offsets(), (NUM_WRIST, 0))
-    gravity, way = model.opt.gravity.copy(), 0.0
+    model = scene.trial_model
+    data = mujoco.MjData(model)
+    data.qpos[:], data.ctrl[:] = start, targets + np.pad(press.offsets(), (NUM_WRIST, 0))
+    model.opt.gravity[:] = 0.0
+    mujoco.mj_step(model, data, nstep=round(_CLOSING_TIME / TIMESTEP))
+    closed, state = data.qpos[-7:].copy(), np.empty(mujoco.mj_stateSize(model, _STATE))
+    mujoco.mj_getState(model, data, state, _STATE)
+    slipped = _apart(start[-7:], closed)
+    total = slipped[0] + _LEVER * slipped[1]
     for pull in (*np.eye(3), *-np.eye(3)):
-        mujoco.mj_resetData(model, data)
-        data.qpos[:], data.ctrl[: scene.count] = start, told
-        model.opt.gravity[:] = 0.0
-        mujoco.mj_step(model, data, nstep=round(_CLOSES / TIMESTEP))
-        closed = data.qpos[-7:].copy()
+        mujoco.mj_setState(model, data, state, _STATE)
         model.opt.gravity[:] = _GRAVITY * pull
-        mujoco.mj_step(model, data, nstep=round(_PULLED / TIMESTEP))
-        for before, after in ((start[-7:], closed), (closed, data.qpos[-7:])):
-            moved, turned = _apart(before, after)
-            way += (moved + _LEVER * turned) / 6
-    model.opt.gravity[:] = gravity
-    return way
+        mujoco.mj_step(model, data, nstep=round(_PULLING_TIME / TIMESTEP))
+        slipped = _apart(closed, data.qpos[-7:])
+        total += (slipped[0] + _LEVER * slipped[1]) / 6
+    return float("inf") if _diverged(data) else total
 
 
 def rehearse(demonstration: Demonstration, body: Body) -> Rehearsal:
-    """A robot's demonstration replayed from its beginning, the hand pressing as its reference will, with no policy."""
-    task, force = Task(), pressing_force(demonstration)
+    """A robot's demonstration replayed from its beginning in `trial_task`, with no policy.
+
+    Raises:
+        InputError: its frames do not fit control steps.
+    """
+    task = trial_task(demonstration)
+    check_rate(demonstration.motion.fps, task.substeps * TIMESTEP)
     reference = make_reference(
-        [demonstration], [body], grip_force=force, wrap_torque=task.wrap_torque, gains=body.gains
+        [demonstration], [body], grip_force=task.grip_force, wrap_torque=task.wrap_torque, gains=body.gains
     )
     (model,) = gauss_seidel([demonstration_spec(demonstration, body, contacts=task.contacts).compile()])
     data, pose = mujoco.MjData(model), demonstration.object_pose
@@ -98,17 +123,22 @@ def rehearse(demonstration: Demonstration, body: Body) -> Rehearsal:
     controls = np.clip(np.asarray(reference.controls[0], float), low, high)
     first = hand_coordinates(model, np.asarray(reference.targets[0, 0], float))
     data.qpos[:] = np.concatenate([first, pose[0]])
-    steps, worst = round(1 / demonstration.motion.fps / TIMESTEP), np.zeros(2)
+    worst = np.zeros(2)
     for frame in range(1, len(pose)):
         data.ctrl[:] = controls[frame]
-        mujoco.mj_step(model, data, nstep=steps)
+        mujoco.mj_step(model, data, nstep=task.substeps)
         worst = np.maximum(worst, _apart(pose[frame], data.qpos[-7:]))
-        if worst[0] > LOST:
+        if worst[0] > _LOST or _diverged(data):
             return Rehearsal(frame / len(pose), *worst.tolist())
     return Rehearsal(1.0, *worst.tolist())
 
 
+def _diverged(data: mujoco.MjData) -> bool:
+    """Whether the engine started over, as it does by itself where numbers are no longer finite."""
+    return any(data.warning[kind].number for kind in DIVERGED)
+
+
 def _apart(one: Float[np.ndarray, "7"], other: Float[np.ndarray, "7"]) -> tuple[float, float]:
     """How far two poses are from each other (m, rad)."""
-    turned = 2 * np.arccos(min(1.0, abs(float(one[3:] @ other[3:]))))
-    return float(np.linalg.norm(other[:3] - one[:3])), float(turned)
+    first, second = (Rotation.from_quat(pose[3:], scalar_first=True) for pose in (one, other))
+    return float(np.linalg.norm(other[:3] - one[:3])), float((first.inv() * second).magnitude())
