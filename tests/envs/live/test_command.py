@@ -13,8 +13,11 @@ import pytest
 from websockets.sync.client import connect
 
 from envs.live.command import main
+from envs.live.session import serving
+from envs.live.sources.mailbox import Mailbox
 from envs.live.twin.hinge_keypoints import hinge_keypoints
 from envs.live.twin.person import SECONDS
+from envs.live.twin.tabletop import tabletop
 from envs.live.twin.tracker import Tracker
 from mjx_hand.capture.keypoints.recording import KeypointRecording, save_keypoints
 from mjx_hand.capture.load_scene import load_scene
@@ -122,6 +125,16 @@ def test_a_demonstration_brings_its_object_and_ends_once(tmp_path, capsys, demon
     assert "warning" not in printed.err
     assert main(["--source", str(tmp_path / "one.npz"), "--object", "pinch"]) == 2
     assert "has an object of its own" in capsys.readouterr().err
+
+
+def test_whoever_waits_goes_on_when_all_is_stopped(tmp_path):
+    """A headset that never sends anything is stopped by another thread."""
+    with serving(Mailbox("headset"), tabletop("pinch"), "right", TOKEN, folder=tmp_path) as session:
+        waits = threading.Thread(target=session.pipeline.wait, args=(None,), daemon=True)
+        waits.start()
+        session.pipeline.stop()
+        waits.join(10)
+        assert not waits.is_alive()
 
 
 @pytest.mark.parametrize(
