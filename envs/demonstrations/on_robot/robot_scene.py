@@ -1,5 +1,7 @@
 """`RobotScene`: a robot hand and a demonstration's object, and what is asked of them."""
 
+import dataclasses
+
 import mujoco
 import numpy as np
 from jaxtyping import Float
@@ -7,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.on_robot.left_out import shared_pads
 from envs.demonstrations.on_robot.pads import demonstrated_pads
+from envs.demonstrations.on_robot.sticking import opposed
 from envs.model_grip import Touch
 from envs.physics.solver import gauss_seidel
 from envs.scene import base_rotation, demonstration_spec, wrist_coordinates
@@ -36,7 +39,10 @@ class RobotScene:
 
     def __init__(self, demonstration: Demonstration, person: RigidHand, body: Body):
         self.demonstration, self.body = demonstration, body
-        self.pads = shared_pads(demonstrated_pads(demonstration, person), body)
+        pads = shared_pads(demonstrated_pads(demonstration, person), body)
+        sides = np.isin(pads.fingers, body.opposing)
+        touching = opposed(pads.touching, sides, demonstration.object_pose[:, :3])
+        self.pads = dataclasses.replace(pads, touching=touching)
         self.base = base_rotation(demonstration)
         motion = demonstration.motion
         self.wrist = wrist_coordinates(motion.wrist_position, motion.wrist_quaternion, self.base)

@@ -15,6 +15,8 @@ from mjx_hand.motion.gaps import spans
 from mjx_hand.smoothstep import smoothstep
 
 _ONTO = 0.1  # s from touching to going with the object, and back
+_CLOSING = 0.2  # s in which a pad comes from its clearance to the surface: in half of it, bottles were knocked over
+_AT_REST = 0.005  # m from where the object stands at the beginning or the end
 
 
 def followed_places(
@@ -39,16 +41,36 @@ def followed_places(
     return wanted
 
 
-def onto(touching: Bool[np.ndarray, "t"], fps: float) -> Float[np.ndarray, "t"]:
+def opposed(
+    touching: Bool[np.ndarray, "t f"], opposing: Bool[np.ndarray, "f"], place: Float[np.ndarray, "t 3"]
+) -> Bool[np.ndarray, "t f"]:
+    """Which fingers touch, without those that are alone on their side of an object that stands.
+
+    A person's thumb is near a bottle half a second before a finger is; a robot's would knock it over meanwhile.
+
+    Args:
+        touching: of each finger.
+        opposing: which fingers oppose the others.
+        place: of the object (m).
+    """
+    stands = np.minimum(*(np.linalg.norm(place - place[end], axis=1) for end in (0, -1))) < _AT_REST
+    both = touching[:, opposing].any(axis=1) & touching[:, ~opposing].any(axis=1)
+    return touching & (both | ~stands)[:, None]
+
+
+def onto(touching: Bool[np.ndarray, "t"], fps: float, seconds: float = _ONTO) -> Float[np.ndarray, "t"]:
     """How much a pad goes with the object, from 0 to 1 and back without a jolt; a demonstration's ends are none."""
-    ramp = round(_ONTO * fps) + 1
+    ramp = round(seconds * fps) + 1
     inside = np.asarray(distance_transform_edt(np.pad(touching, ramp, mode="edge")))[ramp:-ramp]
     return smoothstep(inside / ramp)
 
 
 def still_near(touching: Bool[np.ndarray, "t"], fps: float) -> Float[np.ndarray, "t"]:
-    """How near a pad is to be in each frame, from 0 to 1: it closes as `onto`, and opens only after it touched."""
+    """How near a pad is to be in each frame, from 0 to 1.
+
+    It closes as `onto`, more slowly, and opens only after it touched.
+    """
     late = touching.copy()
-    for frames in range(1, round(_ONTO * fps) + 1):
+    for frames in range(1, round(_CLOSING * fps) + 1):
         late[frames:] |= touching[:-frames]
-    return onto(late, fps)
+    return onto(late, fps, _CLOSING)

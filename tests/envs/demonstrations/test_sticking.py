@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.on_robot.pads import Pads
-from envs.demonstrations.on_robot.sticking import followed_places, onto, still_near
+from envs.demonstrations.on_robot.sticking import followed_places, onto, opposed, still_near
 from mjx_hand.pytree import replace
 
 FIRST, LAST, GRASP = 40, 90, 60
@@ -36,8 +36,20 @@ def test_a_pad_opens_only_after_it_touched():
     touching[20:40] = True
     near = still_near(touching, 50.0)
     assert (near[:20] == 0).all()
-    assert (np.diff(near[20:27]) >= 0).all()
-    assert (near[26:40] == 1).all()
+    assert (np.diff(near[20:31]) > 0).all()  # in 0.2 s
+    assert (near[30:40] == 1).all()
     assert 0 < near[42] < 1
-    assert (near[46:] == 0).all()
+    assert (near[50:] == 0).all()
     assert (onto(touching, 50.0)[36:40] < 1).all()  # what goes with the object has parted from it by then
+
+
+def test_no_finger_touches_alone_what_stands():
+    """A thumb that comes to a bottle before a finger waits for it, and leaves with it; on the way it may be alone."""
+    t = np.arange(100)
+    thumb, index, ring = (t >= 10) & (t < 90), (t >= 20) & (t < 40), (t >= 60) & (t < 80)
+    height = 0.1 * np.clip((t - 30) / 10, 0, 1) * np.clip((70 - t) / 10, 0, 1)  # carried from 30 to 70
+    place = np.stack([0.002 * t.clip(30, 70), 0.0 * t, height], axis=1)
+    found = opposed(np.stack([thumb, index, ring], axis=1), np.array([True, False, False]), place)
+    np.testing.assert_array_equal(found[:, 0], (t >= 20) & (t < 80))
+    np.testing.assert_array_equal(found[:, 1], index)
+    np.testing.assert_array_equal(found[:, 2], ring)

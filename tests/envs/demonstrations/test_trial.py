@@ -86,6 +86,7 @@ def test_objects_that_are_lost_in_rehearsal_are_told(demonstrations, hands, alle
     monkeypatch.setattr(
         robot_set, "on_robot", lambda d, person, body: dataclasses.replace(brought, rehearsal=next(outcomes))
     )
+    monkeypatch.setattr(robot_set, "cached", lambda compute, *ingredients: compute())
     made = robot_set.robot_demonstrations(demonstrations[:2], hands[:2], allegro)
     assert len(made) == 2
     assert "allegro: without a policy 1 of 2 objects of pinch are lost on the way" in capsys.readouterr().out
