@@ -6,12 +6,13 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+import trimesh
 from scipy.spatial.transform import Rotation
 
 from mjx_hand.bodies.robot_body import robot_body
 from mjx_hand.errors import InputError
 from mjx_hand.robots.model.links import hand_links
-from mjx_hand.robots.model.shapes import capsule, off_the_mesh, shapes_of
+from mjx_hand.robots.model.shapes import Shape, capsule, hull, off_the_mesh, shapes_of
 from mjx_hand.robots.robot_hand import load_robot
 from mjx_hand.robots.urdf_file import read_urdf
 from tests.robots import little_hand
@@ -168,3 +169,16 @@ def test_a_capsule_is_measured_against_what_is_seen(tmp_path):
     assert off_the_mesh([box], [box]).max() < 2e-3  # between samples
     away = off_the_mesh([made], [box])
     assert 0.5e-3 < away.mean() < 3e-3
+
+
+@pytest.mark.parametrize(("fineness", "fewer"), [(4, False), (5, True)])
+def test_a_finely_rounded_hull_has_fewer_corners_and_nearly_the_same_shape(fineness, fewer):
+    """Ellipsoids of 2,562 and 10,242 vertices: of the finer no vertex is 0.2 mm outside what is left."""
+    ball = trimesh.creation.icosphere(fineness)
+    vertices = ball.vertices * np.array([0.03, 0.02, 0.01])
+    left = hull(Shape("mesh", (), np.eye(4), vertices, np.asarray(ball.faces)))
+    assert (len(left.vertices) < len(vertices)) == fewer
+    assert len(left.vertices) < 3000
+    outside = -trimesh.Trimesh(left.vertices, left.faces).nearest.signed_distance(vertices[::7])
+    assert outside.max() < 2e-4
+    assert {tuple(row) for row in np.round(left.vertices, 9)} <= {tuple(row) for row in np.round(vertices, 9)}
