@@ -25,7 +25,8 @@ def read_robot(path: Path) -> yourdfpy.Robot:
 def is_mjcf(path: Path) -> bool:
     """Whether a file is an MJCF."""
     try:
-        return next(element.tag for _, element in ElementTree.iterparse(path, ["start"])) == _MJCF
+        with path.open("rb") as file:  # left to itself, iterparse keeps a path's file open after the first element
+            return next(element.tag for _, element in ElementTree.iterparse(file, ["start"])) == _MJCF
     except (ElementTree.ParseError, OSError, StopIteration, UnicodeDecodeError):
         return False
 
