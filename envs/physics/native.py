@@ -38,6 +38,11 @@ DIVERGED = [
 ]
 
 
+def diverged(data: mujoco.MjData) -> bool:
+    """Whether the engine found a bad number since this simulation began, and reset it by itself."""
+    return any(data.warning[kind].number for kind in DIVERGED)
+
+
 class _Worlds(NamedTuple):
     """Worlds as two batches.
 

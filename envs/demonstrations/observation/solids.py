@@ -12,6 +12,7 @@ from mjx_hand.files.array_cache import cached
 from mjx_hand.motion.scene import NO_SURFACE, RecordedObject
 from mjx_hand.objects.convex_decomposition import convex_pieces
 from mjx_hand.objects.mesh_file import check_object_size
+from mjx_hand.objects.outermost import outermost
 from mjx_hand.objects.primitives import hull_planes
 
 _DIRECTIONS, _CORNERS = 400, 96  # of an outline; corners of a piece that was convex already
@@ -63,7 +64,7 @@ def solid_of(recorded: RecordedObject, where: str) -> Solid:
     mesh = _mesh(recorded)
     vertices, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, int)
     check_object_size(f"{where}: object {recorded.name!r}", vertices, faces)
-    outline = _outline(vertices)
+    outline = outermost(vertices, _DIRECTIONS)
     try:
         hull = ConvexHull(outline)
     except QhullError:
@@ -83,7 +84,7 @@ def pieces_of(solid: Solid, most: int) -> Float[np.ndarray, "h c 3"]:
     """Corners of convex pieces that fill it; of a convex one its hull's."""
     hull = ConvexHull(solid.outline)
     if solid.closed and solid.volume > _CONVEX * hull.volume:
-        return _outline(solid.vertices, _CORNERS)[None]
+        return outermost(solid.vertices, _CORNERS)[None]
     vertices, faces = solid.vertices, solid.faces
 
     def cut() -> dict[str, np.ndarray]:
@@ -147,17 +148,6 @@ def _across(normal: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2 3"]:
     x = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
     x /= np.linalg.norm(x)
     return np.stack([x, np.cross(normal, x)])
-
-
-def _outline(vertices: Float[np.ndarray, "v 3"], count: int = _DIRECTIONS) -> Float[np.ndarray, "c 3"]:
-    """Few of a mesh's vertices, the furthest in each of many directions."""
-    turn = np.arange(count) * (np.pi * (3 - np.sqrt(5)))  # a Fibonacci sphere
-    height = np.linspace(-1, 1, count)
-    across = np.sqrt(1 - height**2)
-    directions = np.stack([across * np.cos(turn), across * np.sin(turn), height], axis=1)
-    axes = np.array([[x, y, z] for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)], float)
-    near = vertices - vertices.mean(axis=0)
-    return vertices[np.unique(np.argmax(near @ np.concatenate([axes, directions]).T, axis=0))]
 
 
 def _stands(hull: ConvexHull, points: np.ndarray, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,6 +1,7 @@
 """`RobotScene`: a robot hand and a demonstration's object, and what is asked of them."""
 
 import dataclasses
+import functools
 
 import mujoco
 import numpy as np
@@ -34,7 +35,6 @@ class RobotScene:
         low, high, middle: limits of the targets (wrist and actuated joints), and what lies between them.
         last: each finger's last link, "" the palm's, by its number in `touch`.
         sites: the finger tips'.
-        trial_model: for simulations of grasps in the air: the hand meets the object and itself.
     """
 
     def __init__(self, demonstration: Demonstration, person: RigidHand, body: Body):
@@ -47,7 +47,6 @@ class RobotScene:
         motion = demonstration.motion
         self.wrist = wrist_coordinates(motion.wrist_position, motion.wrist_quaternion, self.base)
         self.model = demonstration_spec(demonstration, body).compile()
-        (self.trial_model,) = gauss_seidel([demonstration_spec(demonstration, body, contacts="self").compile()])
         self.touch = Touch(self.model, body, palm=True)
         self.count = body.num_targets
         self.mix = coordinates_per_target(self.model, self.count)
@@ -58,6 +57,12 @@ class RobotScene:
         self.model.geom_sameframe[ground] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE  # or their places are not read
         self._ground = self.model.geom_pos[ground].copy(), self.model.geom_quat[ground].copy()
         self.sites = {finger: self.model.site(f"{finger}_tip").id for finger in body.fingers}
+
+    @functools.cached_property
+    def trial_model(self) -> mujoco.MjModel:
+        """For simulations of grasps in the air, where the hand meets the object and itself; made when it is asked for."""
+        (model,) = gauss_seidel([demonstration_spec(self.demonstration, self.body, contacts="self").compile()])
+        return model
 
     def place(self, targets: np.ndarray, frame: int) -> None:
         """Put hand and object where they are in a frame with these targets."""

@@ -19,7 +19,7 @@ from envs.demonstrations.on_robot.robot_scene import RobotScene
 from envs.grasps import Pads, grasp_names, grasp_type
 from envs.grip_force import RECORDED, grip_force_of
 from envs.model_grip import Press
-from envs.physics.native import DIVERGED
+from envs.physics.native import diverged
 from envs.physics.solver import gauss_seidel
 from envs.reference import make_reference
 from envs.scene import NUM_WRIST, TIMESTEP, demonstration_spec
@@ -84,9 +84,9 @@ def slip(scene: RobotScene, targets: Float[np.ndarray, "u"]) -> float:
     Returns:
         Infinity where the simulation diverges.
     """
-    task = trial_task(scene.demonstration)
+    force, task = pressing_force(scene.demonstration), trial_task(scene.demonstration)
     scene.place(targets, scene.pads.grasp)
-    press = Press(scene.touch, scene.body, pressing_force(scene.demonstration), scene.body.gains, task.wrap_torque)
+    press = Press(scene.touch, scene.body, force, scene.body.gains, task.wrap_torque)
     start = scene.touch.data.qpos.copy()
     model = scene.trial_model
     data = mujoco.MjData(model)
@@ -103,7 +103,7 @@ def slip(scene: RobotScene, targets: Float[np.ndarray, "u"]) -> float:
         mujoco.mj_step(model, data, nstep=round(_PULLING_TIME / TIMESTEP))
         slipped = _apart(closed, data.qpos[-7:])
         total += (slipped[0] + _LEVER * slipped[1]) / 6
-    return float("inf") if _diverged(data) else total
+    return float("inf") if diverged(data) else total
 
 
 def rehearse(demonstration: Demonstration, body: Body) -> Rehearsal:
@@ -128,14 +128,9 @@ def rehearse(demonstration: Demonstration, body: Body) -> Rehearsal:
         data.ctrl[:] = controls[frame]
         mujoco.mj_step(model, data, nstep=task.substeps)
         worst = np.maximum(worst, _apart(pose[frame], data.qpos[-7:]))
-        if worst[0] > _LOST or _diverged(data):
+        if worst[0] > _LOST or diverged(data):
             return Rehearsal(frame / len(pose), *worst.tolist())
     return Rehearsal(1.0, *worst.tolist())
-
-
-def _diverged(data: mujoco.MjData) -> bool:
-    """Whether the engine started over, as it does by itself where numbers are no longer finite."""
-    return any(data.warning[kind].number for kind in DIVERGED)
 
 
 def _apart(one: Float[np.ndarray, "7"], other: Float[np.ndarray, "7"]) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from envs.live.twin.policy_assist import PolicyAssist
 from envs.live.twin.pose import HandPose
 from envs.live.twin.tabletop import Tabletop
 from envs.live.twin.wrist import Wrist
-from envs.physics.native import DIVERGED
+from envs.physics.native import diverged
 from envs.physics.solver import gauss_seidel
 from envs.scene import NUM_WRIST, OBJECT, scene_spec
 from mjx_hand.hand.joints import LINKS, NUM_HINGES, PARENTS
@@ -85,7 +85,7 @@ class World:
         wanted = np.concatenate([self._wrist.coordinates(target.position, target.quaternion), angles])
         self.data.ctrl[:] = np.clip(wanted, self._low, self._high)
         mujoco.mj_step(self.model, self.data)
-        if any(self.data.warning[kind].number for kind in DIVERGED):
+        if diverged(self.data):
             self.reset(target)
             return False
         return True

@@ -12,12 +12,15 @@ from scipy.spatial import KDTree
 
 from mjx_hand.errors import InputError
 from mjx_hand.files.safe_yaml import shown
+from mjx_hand.objects.outermost import outermost
 from mjx_hand.robots.mjcf_file import ReadMesh
 
 COLLISIONS = ("hulls", "capsules")
 _THICK, _SHORT = 0.008, 0.006  # m: the radius of a capsule along a bone, and a bone that needs none
 _SAMPLES = 2000  # points of a surface, by which shapes are compared
-_MOST_VERTICES, _DIRECTIONS = 3000, 1500  # of a hull; of one with more, those foremost in so many directions are kept
+# Of a hull, and of one with more the directions in which what is kept is foremost. A finely rounded link has thousands,
+# and a training holds hundreds of scenes; what is left out of a ball of 3 cm is 0.05 mm thick.
+_MOST_VERTICES, _DIRECTIONS = 3000, 1500
 
 
 class AbsentMeshError(InputError):
@@ -67,21 +70,8 @@ def hull(shape: Shape) -> Shape:
         low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
         return box(np.maximum((high - low) / 2, 5e-4), (low + high) / 2)
     if len(convex.vertices) > _MOST_VERTICES:
-        convex = trimesh.convex.convex_hull(_outermost(convex.vertices))
+        convex = trimesh.convex.convex_hull(outermost(np.asarray(convex.vertices, float), _DIRECTIONS))
     return Shape("mesh", (), np.eye(4), np.asarray(convex.vertices, float), np.asarray(convex.faces, int))
-
-
-def _outermost(vertices: Float[np.ndarray, "v 3"]) -> Float[np.ndarray, "w 3"]:
-    """Those of a hull's vertices that are foremost in some direction, of directions spread evenly over the sphere.
-
-    A finely rounded link has thousands, and a training holds hundreds of scenes. What is left out of a ball of 3 cm is
-    0.05 mm thick.
-    """
-    k = np.arange(_DIRECTIONS) + 0.5
-    height, turn = 1 - 2 * k / _DIRECTIONS, np.pi * (1 + 5**0.5) * k  # Fibonacci's lattice
-    flat = np.sqrt(1 - height**2)
-    directions = np.stack([flat * np.cos(turn), flat * np.sin(turn), height], axis=1)
-    return vertices[np.unique(np.argmax(vertices @ directions.T, axis=0))]
 
 
 def bones(ends: Sequence[Float[np.ndarray, "3"]]) -> tuple[Shape, ...]:
