@@ -60,7 +60,7 @@ class RobotScene:
 
     @functools.cached_property
     def trial_model(self) -> mujoco.MjModel:
-        """For simulations of grasps in the air, where the hand meets the object and itself; made when it is asked for."""
+        """For simulations of grasps in the air: the hand meets the object and itself. Made when asked for."""
         (model,) = gauss_seidel([demonstration_spec(self.demonstration, self.body, contacts="self").compile()])
         return model
 
