@@ -19,7 +19,7 @@ def test_a_pad_sticks_while_the_finger_touches_and_follows_it_else(demonstration
     own = np.stack([0.02 + 0.001 * np.sin(t / 5), np.maximum(FIRST - t, 0) * 0.001, 0.0 * t], axis=1)  # slips, comes
     places = (position + turn.apply(own))[:, None]
     touching = ((t >= FIRST) & (t < LAST))[:, None]
-    pads = Pads(("thumb",), places, np.zeros((1, 3)), np.zeros((1, 3)), touching, {}, GRASP, False)
+    pads = Pads(("thumb",), places, np.zeros((1, 3)), np.zeros((1, 3)), touching, t >= FIRST, {}, GRASP, False)
     off = np.array([0.001, 0.002, -0.003])
     grasp = position[GRASP] + turn[GRASP].apply(own[GRASP] + off)
     seen = turn.inv().apply(followed_places(pads, grasp[None], d)[:, 0] - position)
@@ -49,7 +49,10 @@ def test_no_finger_touches_alone_what_stands():
     thumb, index, ring = (t >= 10) & (t < 90), (t >= 20) & (t < 40), (t >= 60) & (t < 80)
     height = 0.1 * np.clip((t - 30) / 10, 0, 1) * np.clip((70 - t) / 10, 0, 1)  # carried from 30 to 70
     place = np.stack([0.002 * t.clip(30, 70), 0.0 * t, height], axis=1)
-    found = opposed(np.stack([thumb, index, ring], axis=1), np.array([True, False, False]), place)
+    fingers, opposing = np.stack([thumb, index, ring], axis=1), np.array([True, False, False])
+    found = opposed(fingers, opposing, place, height > 0.005)
     np.testing.assert_array_equal(found[:, 0], (t >= 20) & (t < 80))
     np.testing.assert_array_equal(found[:, 1], index)
     np.testing.assert_array_equal(found[:, 2], ring)
+    ends_aloft = opposed(fingers[:60], opposing, place[:60], height[:60] > 0.005)  # held at the end of the recording
+    np.testing.assert_array_equal(ends_aloft[40:, 0], thumb[40:60])
