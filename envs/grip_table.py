@@ -22,7 +22,7 @@ from mjx_hand.objects.primitives import hull_planes
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand, stack_hands
 
-RECORDED_RAMP = 0.3  # s before a recorded object first moves, in which the grip sets in
+RAMP = 0.3  # s before an object first moves, in which the grip of a recorded hand, or a robot's, sets in
 
 
 def grip_forces(demonstrations: Sequence[Demonstration], grip_force: float | None) -> Float[np.ndarray, "d"]:
@@ -54,7 +54,9 @@ def grip_table(
     """The grip (m, rad) of each demonstration at a force (N); NaN leaves it as it is.
 
     A recorded hand that reaches along an object would knock it over if it pressed on it: there the grip begins
-    shortly before the object moves. In demonstrations of grasp types open fingers stay off the object.
+    shortly before the object moves. In people's demonstrations of grasp types open fingers stay off the object. A
+    robot's grip begins so in all of them: J^T f moves a tip that does not touch yet aside as well (thumbs went 8 mm up
+    and pressed cubes down by their edges), and its controllers bring it late.
     """
     people, frames = people_of(hands), targets.shape[1]
     if people is None:
@@ -64,7 +66,7 @@ def grip_table(
     else:
         grip = _grips_of_people(demonstrations, people, targets, forces, gains, wrap_torque)
     whole = np.ones(frames)
-    ramps = [closing_ramp(d, frames, RECORDED_RAMP) if d.grasp == RECORDED else whole for d in demonstrations]
+    ramps = [closing_ramp(d, frames, RAMP) if people is None or d.grasp == RECORDED else whole for d in demonstrations]
     return grip * jnp.asarray(np.stack(ramps), jnp.float32)[..., None]
 
 

@@ -31,6 +31,7 @@ def follow(scene: RobotScene, grasp: Float[np.ndarray, "u"]) -> Float[np.ndarray
     ways = followed_places(pads, np.array([near[k][1] for k in wanted]), scene.demonstration)
     wrist = _carried(scene, grasp[:NUM_WRIST])
     touches = _touches(scene)
+    ways += _outward(scene, touches)
     clear = _clearances(scene, touches)
     loose = np.stack([_FREE * (_PAD / _FREE) ** touches[finger] for finger in pads.fingers], axis=1)
     unit = np.eye(scene.count)
@@ -74,6 +75,18 @@ def _touches(scene: RobotScene) -> dict[str, Float[np.ndarray, "t"]]:
     pads, fps = scene.pads, scene.demonstration.motion.fps
     fingers = {finger: still_near(pads.touching[:, k], fps) for k, finger in enumerate(pads.fingers)}
     return fingers | {"": still_near(np.asarray(pads.touching.any(axis=1)), fps)}
+
+
+def _outward(scene: RobotScene, touches: dict[str, Float[np.ndarray, "t"]]) -> Float[np.ndarray, "t f 3"]:
+    """How far each pad is straight off its face before it touches, and after (m, world).
+
+    The nearest way off a face may lead around an edge: thumbs that came from above were caught on it.
+    """
+    pads = scene.pads
+    turn = Rotation.from_quat(scene.demonstration.object_pose[:, 3:], scalar_first=True)
+    seen = turn[pads.grasp].inv().apply(-pads.inward)
+    off = np.stack([1 - touches[finger] for finger in pads.fingers], axis=1)
+    return APPROACH * off[..., None] * np.stack([turn.apply(way) for way in seen], axis=1)
 
 
 def _clearances(scene: RobotScene, touches: dict[str, Float[np.ndarray, "t"]]) -> Float[np.ndarray, "t l"]:

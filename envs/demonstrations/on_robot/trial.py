@@ -70,7 +70,7 @@ def trial_task(demonstration: Demonstration) -> Task:
     """The task of a rehearsal; of a recording as its experiments have it, the hand passing through table and itself."""
     force = pressing_force(demonstration)
     if demonstration.grasp == RECORDED:
-        return Task(grip_force=force, contacts="object", wrap_torque=0.0)
+        return Task(grip_force=force, contacts="object")
     return Task(grip_force=force)
 
 

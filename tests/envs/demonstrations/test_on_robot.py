@@ -3,13 +3,16 @@
 import dataclasses
 import itertools
 
+import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.load_env import env_of_set
 from envs.demonstrations.on_robot import bring
 from envs.demonstrations.on_robot.bring import on_robot, possible_grasps
+from envs.demonstrations.on_robot.follow import APPROACH
 from envs.demonstrations.on_robot.grasp import still_targets
 from envs.demonstrations.on_robot.least_squares import solve
 from envs.demonstrations.on_robot.left_out import NO_CLOSURE, NO_FINGERS, OUT_OF_REACH, LeftOut
@@ -17,9 +20,12 @@ from envs.demonstrations.on_robot.pads import demonstrated_pads
 from envs.demonstrations.on_robot.robot_scene import RobotScene
 from envs.demonstrations.on_robot.trial import Rehearsal
 from envs.demonstrations.set_settings import SetSettings
-from envs.model_grip import NEAR
+from envs.grip_force import closing_ramp
+from envs.grip_table import grip_table
+from envs.model_grip import NEAR, Touch
 from envs.reference import demonstrated_targets
 from envs.scene import OBJECT, demonstration_spec
+from mjx_hand.bodies.coordinates import hand_coordinates
 from mjx_hand.errors import InputError
 from mjx_hand.pytree import replace
 
@@ -88,6 +94,35 @@ def test_nothing_comes_near_the_object_before_it_is_touched(brought, demonstrati
     assert before > 3
     assert min(least[:before]) > NEAR
     assert min(least) > -0.002
+
+
+def test_pads_come_straight_to_their_faces(brought, demonstrations, hands, allegro):
+    """While nothing touches the hand stays at its distance in front of each face, and its foremost points with it: a
+    thumb that came the nearest way, from above, was caught on the cube's upper edge."""
+    d = brought.demonstration
+    pads = demonstrated_pads(demonstrations[1], hands[1])
+    first = int(np.argmax(pads.touching.any(axis=1)))
+    frame = first - 1  # nobody has closed yet
+    model = demonstration_spec(d, allegro).compile()
+    touch = Touch(model, allegro)
+    touch.place(hand_coordinates(model, demonstrated_targets(d)[frame]), d.object_pose[frame])
+    turn = [Rotation.from_quat(d.object_pose[k, 3:], scalar_first=True) for k in (pads.grasp, frame)]
+    for k, finger in enumerate(pads.fingers):
+        moved = turn[1] * turn[0].inv()
+        inward = moved.apply(pads.inward[k])
+        place = d.object_pose[frame, :3] + moved.apply(pads.surface[k] - d.object_pose[pads.grasp, :3])
+        link = max(number for number, name in enumerate(touch.fingers) if name == finger)
+        assert (place - touch.foremost(link, inward)) @ inward > 0.8 * APPROACH, finger
+
+
+def test_the_grip_sets_in_shortly_before_the_object_moves(brought, allegro):
+    """Before that fingers may touch, and do not press: J^T f of a tip that is still off takes it aside as well."""
+    d = brought.demonstration
+    given = [d], [allegro], jnp.asarray(demonstrated_targets(d))[None], np.array([12.0]), allegro.gains
+    grip = np.abs(np.asarray(grip_table(*given))[0]).max(axis=1)
+    ramp = closing_ramp(d, len(grip), 0.3)
+    assert (grip[ramp == 0] == 0).all()
+    assert (grip[ramp > 0.2] > 0).all()
 
 
 def test_no_link_is_in_table_or_support(brought, allegro):

@@ -219,3 +219,11 @@ def test_hydras_own_flags_show_the_configuration(tmp_path):
 )
 def test_a_robot_hand_has_a_results_folder_of_its_own(overrides, folder):
     assert compose(overrides).out == folder
+
+
+def test_what_was_measured_to_differ_by_hand_does():
+    """A robot's hand that wraps a recorded bottle closes; in a person's the force that the weight asks for holds it."""
+    recording = ["config=mustard", "data.recording.path=here"]
+    assert compose(recording).task.wrap_torque == 0.0
+    assert compose([*recording, "hand=allegro"]).task.wrap_torque == 0.5
+    assert compose([*recording, "hand=allegro", "task.wrap_torque=0.3"]).task.wrap_torque == 0.3
