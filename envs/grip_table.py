@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.spatial.transform import Rotation
 
-from envs.grasps import grasp_names, grasp_type
+from envs.grasps import Pads, grasp_names, grasp_type
 from envs.grip import grip_offsets
 from envs.grip_force import RECORDED, closing_ramp, grip_force_of
 from envs.model_grip import model_grips
@@ -25,8 +25,14 @@ from mjx_hand.rigid.rigid_hand import RigidHand, stack_hands
 RAMP = 0.3  # s before an object first moves, in which the grip of a recorded hand, or a robot's, sets in
 
 
-def grip_forces(demonstrations: Sequence[Demonstration], grip_force: float | None) -> Float[np.ndarray, "d"]:
-    """The force (N) of each demonstration's grip."""
+def grip_forces(
+    demonstrations: Sequence[Demonstration], hands: Sequence[RigidHand | Body], grip_force: float | None
+) -> Float[np.ndarray, "d"]:
+    """The force (N) of each demonstration's grip: the one given, or else `own_force`.
+
+    Raises:
+        InputError: none is given, and a demonstration is of no type and no recording.
+    """
     if grip_force is not None:
         return np.full(len(demonstrations), grip_force)
     unknown = sorted({d.grasp for d in demonstrations} - {*grasp_names(), RECORDED})
@@ -35,12 +41,20 @@ def grip_forces(demonstrations: Sequence[Demonstration], grip_force: float | Non
             f"demonstrations of {unknown[0]!r} are of no grasp type ({', '.join(grasp_names())}) that says how hard to "
             "press; give task.grip_force, in newtons"
         )
-    return np.array(
-        [
-            grip_force_of(d.object.mass, d.object.friction) if d.grasp == RECORDED else grasp_type(d.grasp).grip_force
-            for d in demonstrations
-        ]
-    )
+    robot = people_of(hands) is None
+    return np.array([own_force(d, robot=robot) for d in demonstrations])
+
+
+def own_force(demonstration: Demonstration, *, robot: bool) -> float:
+    """The force (N) of a demonstration's grip: its type's, or where it is of none what the object's weight asks for.
+
+    Pads of a robot press as people's did in the demonstrations, for which its grasps are tried. A person's press with
+    less, and a policy adds to it.
+    """
+    if demonstration.grasp not in grasp_names():
+        return grip_force_of(demonstration.object.mass, demonstration.object.friction)
+    grasp = grasp_type(demonstration.grasp)
+    return grasp.closing.force if robot and isinstance(grasp.closing, Pads) else grasp.grip_force
 
 
 def grip_table(

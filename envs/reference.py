@@ -81,7 +81,7 @@ def make_reference(
             teleoperated hand that no tracker saw.
     """
     _check(demonstrations)
-    forces = grip_forces(demonstrations, grip_force)
+    forces = grip_forces(demonstrations, hands, grip_force)
     frames = max(d.num_frames for d in demonstrations)
     targets, poses, bases, approach = [], [], [], []
     for d in demonstrations:

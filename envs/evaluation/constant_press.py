@@ -73,7 +73,7 @@ class ConstantPress:
 
 def constant_press(env: TrackingEnv) -> ConstantPress:
     """What presses the demonstrations of an environment."""
-    forces = grip_forces(env.demonstrations, env.task.grip_force)
+    forces = grip_forces(env.demonstrations, env.hands, env.task.grip_force)
     grasps = np.array([d.grasp for d in env.demonstrations])
     full = {d.grasp: _full(d, env, float(np.median(forces[grasps == d.grasp]))) for d in env.demonstrations}
     pressing = np.array([np.nan if (force := full[d.grasp]) is None else force for d in env.demonstrations])

@@ -16,8 +16,8 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.on_robot.robot_scene import RobotScene
-from envs.grasps import Pads, grasp_names, grasp_type
-from envs.grip_force import RECORDED, grip_force_of
+from envs.grip_force import RECORDED
+from envs.grip_table import own_force
 from envs.model_grip import Press
 from envs.physics.native import diverged
 from envs.physics.solver import gauss_seidel
@@ -55,20 +55,9 @@ class Rehearsal:
         return self.until, -self.moved / _DISTANCE - self.turned / _ANGLE
 
 
-def pressing_force(demonstration: Demonstration) -> float:
-    """The force (N) with which pads press in a trial.
-
-    That with which people's demonstrations of the grasp type are made; of no type, what the object's weight asks for.
-    """
-    if demonstration.grasp not in grasp_names():
-        return grip_force_of(demonstration.object.mass, demonstration.object.friction)
-    grasp = grasp_type(demonstration.grasp)
-    return grasp.closing.force if isinstance(grasp.closing, Pads) else grasp.grip_force
-
-
 def trial_task(demonstration: Demonstration) -> Task:
     """The task of a rehearsal; of a recording as its experiments have it, the hand passing through table and itself."""
-    force = pressing_force(demonstration)
+    force = own_force(demonstration, robot=True)
     if demonstration.grasp == RECORDED:
         return Task(grip_force=force, contacts="object")
     return Task(grip_force=force)
@@ -84,7 +73,7 @@ def slip(scene: RobotScene, targets: Float[np.ndarray, "u"]) -> float:
     Returns:
         Infinity where the simulation diverges.
     """
-    force, task = pressing_force(scene.demonstration), trial_task(scene.demonstration)
+    force, task = own_force(scene.demonstration, robot=True), trial_task(scene.demonstration)
     scene.place(targets, scene.pads.grasp)
     press = Press(scene.touch, scene.body, force, scene.body.gains, task.wrap_torque)
     start = scene.touch.data.qpos.copy()

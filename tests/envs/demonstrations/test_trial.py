@@ -7,11 +7,12 @@ import pytest
 
 from envs.demonstrations.on_robot import robot_set, trial
 from envs.demonstrations.on_robot.robot_scene import RobotScene
-from envs.demonstrations.on_robot.trial import Rehearsal, pressing_force, rehearse, slip, trial_task
+from envs.demonstrations.on_robot.trial import Rehearsal, rehearse, slip, trial_task
 from envs.evaluation.metrics import position_error, rotation_error
 from envs.evaluation.roll_out import make_roll_out, zero_residual
 from envs.grasps import grasp_type
 from envs.grip_force import RECORDED, grip_force_of
+from envs.grip_table import grip_forces, own_force
 from envs.task import Task
 from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
@@ -21,14 +22,23 @@ FORCE = 12.0  # N, with which demonstrations of pinches are made
 
 
 def test_the_force_is_that_of_the_demonstrations(demonstrations):
+    """Of a person's pinch the reference has less, to which a policy adds."""
     d = demonstrations[1]
-    assert pressing_force(d) == FORCE
-    assert pressing_force(replace(d, grasp="power")) == grasp_type("power").grip_force
-    recorded = replace(d, grasp=RECORDED)
-    assert pressing_force(recorded) == grip_force_of(d.object.mass, d.object.friction)
-    assert pressing_force(replace(d, grasp="mine")) == pressing_force(recorded)
-    assert trial_task(recorded) == Task(grip_force=pressing_force(recorded), contacts="object")
+    assert own_force(d, robot=True) == FORCE
+    assert own_force(d, robot=False) == grasp_type("pinch").grip_force < FORCE
+    for robot in (True, False):
+        assert own_force(replace(d, grasp="power"), robot=robot) == grasp_type("power").grip_force
+        weight = grip_force_of(d.object.mass, d.object.friction)
+        assert own_force(replace(d, grasp=RECORDED), robot=robot) == weight
+        assert own_force(replace(d, grasp="mine"), robot=robot) == weight
+    assert trial_task(replace(d, grasp=RECORDED)) == Task(grip_force=weight, contacts="object")
     assert trial_task(d) == Task(grip_force=FORCE)
+
+
+def test_a_robots_reference_presses_as_its_grasps_were_tried(demonstrations, hands, allegro, brought):
+    assert grip_forces([brought.demonstration], [allegro], None) == [FORCE]
+    assert grip_forces([brought.demonstration], [allegro], 3.0) == [3.0]
+    assert grip_forces([demonstrations[1]], [hands[1]], None) == [grasp_type("pinch").grip_force]
 
 
 def test_a_grasp_slips_less_than_an_open_hand(demonstrations, hands, allegro, brought):
