@@ -22,7 +22,7 @@ from mjx_hand.objects.primitives import hull_planes
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand, stack_hands
 
-RAMP = 0.3  # s before an object first moves, in which the grip of a recorded hand, or a robot's, sets in
+_RAMP = 0.3  # s before an object first moves, in which the grip of a recorded hand, or a robot's, sets in
 
 
 def grip_forces(
@@ -68,20 +68,34 @@ def grip_table(
     """The grip (m, rad) of each demonstration at a force (N); NaN leaves it as it is.
 
     A recorded hand that reaches along an object would knock it over if it pressed on it: there the grip begins
-    shortly before the object moves. In people's demonstrations of grasp types open fingers stay off the object. A
-    robot's grip begins so in all of them: J^T f moves a tip that does not touch yet aside as well (thumbs went 8 mm up
-    and pressed cubes down by their edges), and its controllers bring it late.
+    shortly before the object moves. In people's demonstrations of grasp types open fingers stay off the object.
     """
-    people, frames = people_of(hands), targets.shape[1]
+    people = people_of(hands)
     if people is None:
-        bodies = [body_of(hand) for hand in hands]
-        told = model_grips(demonstrations, bodies, np.asarray(targets, float), forces, gains, wrap_torque)
-        grip = jnp.asarray(told, jnp.float32)
-    else:
-        grip = _grips_of_people(demonstrations, people, targets, forces, gains, wrap_torque)
+        bodies, told = [body_of(hand) for hand in hands], np.asarray(targets, float)
+        return jnp.asarray(robot_grips(demonstrations, bodies, told, forces, gains, wrap_torque), jnp.float32)
+    grip = _grips_of_people(demonstrations, people, targets, forces, gains, wrap_torque)
+    frames = targets.shape[1]
     whole = np.ones(frames)
-    ramps = [closing_ramp(d, frames, RAMP) if people is None or d.grasp == RECORDED else whole for d in demonstrations]
+    ramps = [closing_ramp(d, frames, _RAMP) if d.grasp == RECORDED else whole for d in demonstrations]
     return grip * jnp.asarray(np.stack(ramps), jnp.float32)[..., None]
+
+
+def robot_grips(
+    demonstrations: Sequence[Demonstration],
+    bodies: Sequence[Body],
+    targets: Float[np.ndarray, "d t u"],
+    forces: Float[np.ndarray, "d"],
+    gains: Gains,
+    wrap_torque: float,
+) -> Float[np.ndarray, "d t u"]:
+    """`grip_table` of robots, for which the grip begins shortly before the object moves in all demonstrations.
+
+    J^T f moves a tip that does not touch yet aside as well, and controllers bring it late: thumbs went 8 mm up and
+    pressed cubes down by their edges.
+    """
+    ramps = np.stack([closing_ramp(d, targets.shape[1], _RAMP) for d in demonstrations])
+    return model_grips(demonstrations, bodies, targets, forces, gains, wrap_torque) * ramps[..., None]
 
 
 def _grips_of_people(

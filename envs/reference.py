@@ -91,7 +91,7 @@ def make_reference(
         approach.append(padded(approach_weights(np.asarray(d.object_pose), d.motion.fps), frames))
     targets = jnp.asarray(np.stack(targets), jnp.float32)
     grip = grip_table(demonstrations, hands, targets, np.where(forces > 0, forces, np.nan), gains, wrap_torque)
-    controls = anticipated(targets, gains, demonstrations[0].motion.fps) + grip
+    controls = jnp.asarray(anticipated(targets, gains, demonstrations[0].motion.fps)) + grip
     lacking = None
     if live:
         tracked = jnp.asarray(np.stack([padded(_tracked(d), frames) for d in demonstrations]), jnp.float32)
@@ -172,14 +172,18 @@ def _tips(
     return np.einsum("dtij,dtfj->dtfi", wrist, tips) + place[:, :, None]
 
 
-def anticipated(targets: Float[Array, "d t u"], gains: Gains, fps: float) -> Float[Array, "d t u"]:
-    """Targets led by the controllers' lag times the targets' speed.
+def anticipated(
+    targets: Float[Array, "d t u"] | Float[np.ndarray, "d t u"], gains: Gains, fps: float
+) -> Float[Array, "d t u"] | Float[np.ndarray, "d t u"]:
+    """Targets led by the controllers' lag times the targets' speed; of JAX or of NumPy, as they are given.
 
     A position controller with damping follows a moving target kv/kp seconds late. A frame's target is commanded for the
     whole step that ends at that frame, half a step early on average, which makes up for part of it.
     """
     kp = np.concatenate([[gains.wrist_slide[0]] * 3, [gains.wrist_turn[0]] * 3, gains.stiffness])
     kv = np.concatenate([[gains.wrist_slide[1]] * 3, [gains.wrist_turn[1]] * 3, gains.damping])
+    if isinstance(targets, np.ndarray):
+        return targets + (kv / kp - 0.5 / fps) * np.gradient(targets, 1 / fps, axis=1)
     speed = jnp.asarray(jnp.gradient(targets, 1 / fps, axis=1))
     return targets + jnp.asarray(kv / kp - 0.5 / fps, jnp.float32) * speed
 

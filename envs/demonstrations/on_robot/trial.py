@@ -17,11 +17,11 @@ from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.on_robot.robot_scene import RobotScene
 from envs.grip_force import RECORDED
-from envs.grip_table import own_force
+from envs.grip_table import own_force, robot_grips
 from envs.model_grip import Press
 from envs.physics.native import diverged
 from envs.physics.solver import gauss_seidel
-from envs.reference import make_reference
+from envs.reference import anticipated, demonstrated_targets
 from envs.scene import NUM_WRIST, TIMESTEP, demonstration_spec
 from envs.task import Task, check_rate
 from mjx_hand.bodies.body import Body
@@ -103,15 +103,14 @@ def rehearse(demonstration: Demonstration, body: Body) -> Rehearsal:
     """
     task = trial_task(demonstration)
     check_rate(demonstration.motion.fps, task.substeps * TIMESTEP)
-    reference = make_reference(
-        [demonstration], [body], grip_force=task.grip_force, wrap_torque=task.wrap_torque, gains=body.gains
-    )
+    # As `make_reference`, which JAX would compile anew for each number of frames.
+    targets, force = demonstrated_targets(demonstration)[None], np.array([task.grip_force])
+    grip = robot_grips([demonstration], [body], targets, force, body.gains, task.wrap_torque)
+    controls = (anticipated(targets, body.gains, demonstration.motion.fps) + grip)[0]
     (model,) = gauss_seidel([demonstration_spec(demonstration, body, contacts=task.contacts).compile()])
     data, pose = mujoco.MjData(model), demonstration.object_pose
-    low, high = model.actuator_ctrlrange.T
-    controls = np.clip(np.asarray(reference.controls[0], float), low, high)
-    first = hand_coordinates(model, np.asarray(reference.targets[0, 0], float))
-    data.qpos[:] = np.concatenate([first, pose[0]])
+    controls = np.clip(controls, *model.actuator_ctrlrange.T)
+    data.qpos[:] = np.concatenate([hand_coordinates(model, targets[0, 0]), pose[0]])
     worst = np.zeros(2)
     for frame in range(1, len(pose)):
         data.ctrl[:] = controls[frame]
