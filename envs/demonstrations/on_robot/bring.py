@@ -6,7 +6,7 @@ postures: each robot finger whose person's finger touches lies with its last lin
 other link is inside the object, none in table or support, and the wrist is turned as the person's where that leaves a
 choice. From a grasp that could hold the object the wrist then goes as the person's went, and fingers are where the
 person's pads were, but off the object until they touch it. The best few grasps are rehearsed that way in simulation, up
-to the first with which the object stays near its demonstrated way, and more of them where it is lost with all; where it
+to the first with which the object stays near its demonstrated way, and more of them where all lose or turn it; where it
 stays near with none, the one that holds it longest and nearest is taken.
 """
 
@@ -33,7 +33,7 @@ from mjx_hand.rigid.rigid_hand import RigidHand
 _DEPTH = 0.004  # m that a link may be inside the object
 _OFF = 0.004  # m that a finger may be off the surface where it should touch
 _TOUCHES = 0.002  # m off the surface at which a link bears
-_REHEARSED = 4  # grasps, and further ones until the object is not lost
+_REHEARSED = 4  # grasps, and further ones until the object is neither lost nor turned
 _NEAR_ENOUGH, _TURNED_LITTLE = 0.01, 0.25  # m, rad from the demonstrated pose, within which no better one is sought
 
 
@@ -63,7 +63,7 @@ def on_robot(demonstration: Demonstration, person: RigidHand, body: Body) -> Bro
     scene, grasps = possible_grasps(demonstration, person, body)
     tried = []
     for grasp in sorted(grasps, key=lambda each: slip(scene, each.targets)):
-        if len(tried) >= _REHEARSED and any(brought.rehearsal.until == 1 for brought in tried):
+        if len(tried) >= _REHEARSED and any(brought.rehearsal.held for brought in tried):
             break
         rows = follow(scene, grasp.targets)
         turn = Rotation.from_matrix(scene.base) * Rotation.from_euler("XYZ", rows[:, 3:NUM_WRIST])

@@ -32,6 +32,7 @@ _GRAVITY = 9.81  # m/s^2
 _CLOSING_TIME, _PULLING_TIME = 0.1, 0.4  # s
 _LEVER = 0.05  # m: a turn of 1 rad counts as this distance
 _LOST = 0.1  # m from its demonstrated place, where an object is lost: as far as CHORD allows
+_TURNED = 0.4  # rad from its demonstrated pose, beyond which little is left of the 0.5 that CHORD allows
 _DISTANCE, _ANGLE = 0.02, 0.5  # m, rad that weigh the same
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 
@@ -48,6 +49,11 @@ class Rehearsal:
     until: float
     moved: float
     turned: float
+
+    @property
+    def held(self) -> bool:
+        """Whether the object was neither lost nor turned in the hand."""
+        return self.until == 1 and self.turned < _TURNED
 
     @property
     def score(self) -> tuple[float, float]:

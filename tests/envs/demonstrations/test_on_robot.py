@@ -201,13 +201,13 @@ def test_grasps_that_cannot_hold_are_passed_over(demonstrations, hands, allegro,
     assert left_out.value.reason == OUT_OF_REACH
 
 
-@pytest.mark.parametrize(("until", "most"), [(1.0, 4), (0.5, 100)])
-def test_what_slips_least_is_rehearsed_first(until, most, demonstrations, hands, allegro, monkeypatch):
-    """Four of them, and all where the object is lost with each."""
+@pytest.mark.parametrize(("until", "turned", "most"), [(1.0, 0.3, 4), (0.5, 0.1, 100), (1.0, 0.45, 100)])
+def test_what_slips_least_is_rehearsed_first(until, turned, most, demonstrations, hands, allegro, monkeypatch):
+    """Four of them, and all where the object is lost or turned with each."""
     slips, made = [], []
     monkeypatch.setattr(bring, "slip", lambda scene, targets: slips.append(targets) or len(slips) % 3)
     monkeypatch.setattr(bring, "follow", lambda scene, grasp: made.append(grasp) or np.tile(grasp, (len(way), 1)))
-    monkeypatch.setattr(bring, "rehearse", lambda d, body: Rehearsal(until, 0.05, 0.0))
+    monkeypatch.setattr(bring, "rehearse", lambda d, body: Rehearsal(until, 0.05, turned))
     way = demonstrations[1].object_pose
     on_robot(demonstrations[1], hands[1], allegro)
     assert len(slips) > 4
