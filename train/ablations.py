@@ -16,11 +16,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mjx_hand.errors import InputError
-from train.experiments import SEEDS, listed, measure, run_command, taken
+from train.experiments import SEEDS, measure, run_command, taken
 from train.reports.ablations_page import Ablation, write_ablations_page
 from train.reports.ablations_variants import UNCHANGED, VARIANTS, Variant
 from train.reports.results_table import Experiment
 from train.settings.config import Config, compose_seeds
+from train.settings.overrides import listed
 
 NAMES = ("spherical",)
 FOLDER = "outputs/ablations"

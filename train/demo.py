@@ -26,8 +26,7 @@ from mjx_hand.motion import load_motion_file
 from mjx_hand.progress import clock
 from mjx_hand.retarget.sequence import RetargetErrors, retarget_errors, retarget_sequence, rigid_hand_of
 from mjx_hand.view.figures import plots
-from mjx_hand.view.report import Film, Headline, Plot, Report, Section, Table, write_report
-from train.evaluate import show
+from mjx_hand.view.report import Film, Headline, Plot, Report, Section, Table, print_table, write_report
 from train.experiment.evaluate_seeds import POLICY, PRESS, REPLAY, ZERO, Results, evaluate_seeds, median_and_worst
 from train.experiment.setup import training_env
 from train.experiment.stress import BRIEF, stress
@@ -73,7 +72,7 @@ def main(config: Config) -> None:
         video = film(results.env, results.rollouts[POLICY], median, out / "twin.mp4", _FILM)
     write_report(out / "report.html", _report(config, errors, points, results, disturbed, video, timings))
     for table in [*tables(by_seed, config), disturbed]:
-        show(table)
+        print_table(table)
     print(f"\nreport: {(out / 'report.html').resolve()}  (open it in a browser)")
     print(f"all results: {out.resolve()}")
 

@@ -12,10 +12,7 @@ curves on the page, `stress.json` and `stress.csv` (one row per rollout).
 from collections.abc import Sequence
 from pathlib import Path
 
-from rich.console import Console
-from rich.table import Table as RichTable
-
-from mjx_hand.view.report import Table, write_report
+from mjx_hand.view.report import Table, print_table, write_report
 from train.experiment.evaluate_seeds import evaluate_seeds, shared_folder
 from train.experiment.setup import settled
 from train.experiment.stress import stress
@@ -45,19 +42,11 @@ def evaluate_and_write(configs: Sequence[Config]) -> tuple[Path, tuple[Table, ..
     return out, (*tables(results, configs[0]), *([] if disturbed is None else [stress_table(disturbed)]))
 
 
-def show(table: Table) -> None:
-    """Print a report's table on the terminal."""
-    made = RichTable(*table.columns, caption=table.note or None)
-    for row in table.rows:
-        made.add_row(*row)
-    Console().print(made)
-
-
 def main(configs: Sequence[Config]) -> None:
     """Evaluate, print the tables, write the files."""
     out, made = evaluate_and_write(configs)
     for table in made:
-        show(table)
+        print_table(table)
     more = ", stress.json and stress.csv" if configs[0].stress else ""
     print(f"written: {(out / 'evaluation.html').resolve()}, evaluation.json and evaluation.csv{more}")
 

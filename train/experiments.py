@@ -67,18 +67,6 @@ def taken(argv: Sequence[str], keys: Sequence[str]) -> tuple[dict[str, str], lis
     return own, overrides
 
 
-def listed(own: Mapping[str, str], key: str, otherwise: Sequence[str]) -> list[str]:
-    """The names of an argument such as names=[power,pinch], each once; `otherwise` where it is not given.
-
-    Raises:
-        InputError: it names nothing.
-    """
-    names = [name.strip(" '\"") for name in own[key].strip("[]").split(",")] if key in own else list(otherwise)
-    if not all(names):
-        raise InputError(f"{key}={own[key]} names nothing; give for example {key}=[{','.join(otherwise)}]")
-    return list(dict.fromkeys(names))
-
-
 def _is_finished(config: Config) -> bool:
     try:
         return is_finished(config, load_curve(config.out))

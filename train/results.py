@@ -19,10 +19,11 @@ from envs.demonstrations.load_set import SEALED
 from envs.grasps import FIVE, grasp_names
 from mjx_hand.errors import InputError
 from train.experiment.evaluate_seeds import shared_folder
-from train.experiments import SEEDS, listed, measure, run_command, taken
+from train.experiments import SEEDS, measure, run_command, taken
 from train.reports.results_page import write_results_page
 from train.reports.results_table import Experiment
 from train.settings.config import Config, compose_seeds
+from train.settings.overrides import listed
 
 FOLDER = "outputs/results"
 

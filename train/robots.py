@@ -22,10 +22,9 @@ from mjx_hand.errors import InputError
 from mjx_hand.files.npz_archive import replacing
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.progress import counter
-from mjx_hand.view.report import Table
-from train.evaluate import show
-from train.experiments import listed
+from mjx_hand.view.report import Table, print_table
 from train.settings.config import Config, compose
+from train.settings.overrides import listed
 
 NAME = "robots"
 
@@ -93,7 +92,7 @@ def run(hands: Sequence[str], first: int | None, config: Config) -> Path:
     for single in config.data.expand_types():
         demonstrations += load_demonstrations(single, config.part, config.demonstrations)[:first]
     rows = [row for hand in hands for row in possible(hand, demonstrations)]
-    show(table(rows, config.part))
+    print_table(table(rows, config.part))
     told = [
         {"hand": r.hand, "grasp": r.grasp, "of": r.total, "done": r.total - len(r.left_out), "left out": r.left_out}
         for r in rows

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import jinja2
 from matplotlib.figure import Figure
+from rich.console import Console
+from rich.table import Table as RichTable
 
 from mjx_hand.errors import InputError
 from mjx_hand.files.npz_archive import replacing
@@ -82,6 +84,14 @@ class Report:
     sections: Sequence[Section] = ()
     how: Sequence[tuple[str, str]] = ()
     commands: Sequence[str] = ()
+
+
+def print_table(table: Table) -> None:
+    """A report's table on the terminal."""
+    made = RichTable(*table.columns, caption=table.note or None)
+    for row in table.rows:
+        made.add_row(*row)
+    Console().print(made)
 
 
 def write_report(path: str | Path, report: Report) -> None:

@@ -1,6 +1,6 @@
 """What a few command-line overrides stand for, before Hydra composes them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from envs.demonstrations.set_settings import GIVEN
 from mjx_hand.errors import InputError
@@ -41,6 +41,18 @@ def options_given(overrides: Sequence[str]) -> list[str]:
 def old_names(overrides: Sequence[str]) -> dict[str, str]:
     """The options among overrides that have another name now, and that name."""
     return {option: RENAMED[option] for option in map(_option, overrides) if option in RENAMED}
+
+
+def listed(own: Mapping[str, str], key: str, otherwise: Sequence[str]) -> list[str]:
+    """The names of an argument such as names=[power,pinch], each once; `otherwise` where it is not given.
+
+    Raises:
+        InputError: it names nothing.
+    """
+    names = [name.strip(" '\"") for name in own[key].strip("[]").split(",")] if key in own else list(otherwise)
+    if not all(names):
+        raise InputError(f"{key}={own[key]} names nothing; give for example {key}=[{','.join(otherwise)}]")
+    return list(dict.fromkeys(names))
 
 
 def _option(override: str) -> str:
