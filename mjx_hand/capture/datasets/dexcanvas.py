@@ -19,7 +19,8 @@ Its formula for the hand: made with `flat_hand_mean=True` from all 48 values, th
 origin*, so the wrist is at `mano_global_pos` plus the turned place of the resting wrist. What was captured has the
 joints before that turn, wrist first, then thumb to little finger: the first is that place; without joints, it is the
 licensed file's or the open hand's. What was replayed in simulation has them in the world: palm, index, middle, ring,
-little finger, thumb, three each, then the tips from the thumb on. Bones that keep their length tell which it is.
+little finger, thumb, three each, then the tips from the thumb on. Bones that keep their length tell which it is, and a
+wrist within 20 cm of the origin in what was captured.
 
 None of this could be checked on a recording. Of the released Parquet's card only the introduction could be read, not
 its list of columns: a table without `hands` is refused with the names of those it has. So are the first previews'
@@ -54,6 +55,7 @@ _NEEDED = ("mano_global_pos", "mano_global_rot_aa", "mano_hand_pose")
 _OTHERS = ("mano_joint_pos", "shape")
 # The simulation's joints in the captures' order.
 _REPLAYED = (0, 13, 14, 15, 16, 1, 2, 3, 17, 4, 5, 6, 18, 7, 8, 9, 19, 10, 11, 12, 20)
+_RESTING_WRIST = 0.2  # m at most of the resting wrist from the hand model's origin: of MANO's 0.1
 _MESHES = ("{0}/{0}_aligned.stl", "{0}_aligned.stl", "{0}/{0}.stl", "{0}.stl")
 
 
@@ -181,16 +183,20 @@ def _with_joints(
     valid: Bool[Array, "t"],
 ) -> tuple[Subject, Float[Array, "t 3"]]:
     """The subject whose joints these are, and where the wrist is, by the captures' account or the simulation's."""
-    try:
-        subject = subject_with_joints(path, shape, own, fingers, joints, valid)
-        return subject, place + whole @ subject.wrist
-    except InputError as refusal:
-        moved = joints[:, _REPLAYED]
+    refusal = None
+    # In a clip in which hardly anything moves all bones keep their lengths by either account.
+    if (np.linalg.norm(joints[valid, 0], axis=1) < _RESTING_WRIST).all():
         try:
-            subject = subject_with_joints(path, shape, whole @ own, fingers, moved - moved[:, :1], valid)
-        except InputError:
-            raise refusal from None
-        return subject, moved[:, 0]
+            subject = subject_with_joints(path, shape, own, fingers, joints, valid)
+            return subject, place + whole @ subject.wrist
+        except InputError as error:
+            refusal = error
+    moved = joints[:, _REPLAYED]
+    try:
+        subject = subject_with_joints(path, shape, whole @ own, fingers, moved - moved[:, :1], valid)
+    except InputError as error:
+        raise refusal or error from None
+    return subject, moved[:, 0]
 
 
 def _rate(path: Path, row: Contents) -> float:

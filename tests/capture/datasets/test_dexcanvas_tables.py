@@ -103,6 +103,18 @@ def test_hands_come_out_where_they_were_by_both_accounts_of_the_joints(tmp_path,
     assert (motion.fps, motion.source) == (99.0, f"DexCanvas part-0, {side} hand")
 
 
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_a_hand_that_keeps_still_is_not_taken_for_captured(tmp_path, side):
+    """All bones keep their lengths then, in whatever order joints are taken; the wrist is where the table says."""
+    table = row(side, simulated=True)
+    for fields_of_hand in table["hands"]:
+        for name, values in fields_of_hand.items():
+            if isinstance(values, list) and values:
+                fields_of_hand[name] = [values[2]] * len(values)
+    motion = load_motion(write(tmp_path, table))
+    np.testing.assert_allclose(joints_of(motion)[:, :16], in_world(local_joints(side))[[2] * 6, :16], atol=1e-5)
+
+
 def test_a_scene_has_both_hands_and_the_objects_with_their_meshes(tmp_path):
     path = write(tmp_path / "tables" / "train", row("right", "left", objects=("cube1", "bowl", "bowl")))
     test_objects.mesh(tmp_path / "assets" / "objects" / "cube1" / "cube1_aligned.stl", scale=1e3)
