@@ -9,6 +9,7 @@ from envs.scene import OBJECT
 from mjx_hand.motion.demonstration import Demonstration
 
 RECORDED = "recorded"  # what a demonstration that is of no grasp type calls its grasp
+SETS_IN = 0.3  # s before an object first moves, in which the grip of a recorded hand, or a robot's, sets in
 _GRAVITY = 9.81
 _MOVED, _TURNED = 0.002, np.deg2rad(2.0)  # m, rad from its first pose
 
@@ -31,7 +32,7 @@ def least_contact_force(model: mujoco.MjModel) -> float:
 
 
 def closing_ramp(demonstration: Demonstration, frames: int, seconds: float) -> Float[np.ndarray, "{frames}"]:
-    """From 0 to 1 in these seconds before the object first moves, and 1 from then on."""
+    """From 0 to 1 in these seconds before the object first moves, and 1 from then on"""
     pose = demonstration.object_pose
     turned = Rotation.from_quat(pose[:, 3:], scalar_first=True)
     away = np.linalg.norm(pose[:, :3] - pose[0, :3], axis=1) > _MOVED

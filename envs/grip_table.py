@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from envs.grasps import Pads, grasp_names, grasp_type
 from envs.grip import grip_offsets
-from envs.grip_force import RECORDED, closing_ramp, grip_force_of
+from envs.grip_force import RECORDED, SETS_IN, closing_ramp, grip_force_of
 from envs.model_grip import model_grips
 from envs.scene import NUM_WRIST
 from mjx_hand.bodies.body import Body
@@ -22,13 +22,11 @@ from mjx_hand.objects.primitives import hull_planes
 from mjx_hand.rigid.gains import Gains
 from mjx_hand.rigid.rigid_hand import RigidHand, stack_hands
 
-_RAMP = 0.3  # s before an object first moves, in which the grip of a recorded hand, or a robot's, sets in
-
 
 def grip_forces(
     demonstrations: Sequence[Demonstration], hands: Sequence[RigidHand | Body], grip_force: float | None
 ) -> Float[np.ndarray, "d"]:
-    """The force (N) of each demonstration's grip: the one given, or else `own_force`.
+    """The force (N) of each demonstration's grip: the one given, or else `default_grip_force`.
 
     Raises:
         InputError: none is given, and a demonstration is of no type and no recording.
@@ -42,10 +40,10 @@ def grip_forces(
             "press; give task.grip_force, in newtons"
         )
     robot = people_of(hands) is None
-    return np.array([own_force(d, robot=robot) for d in demonstrations])
+    return np.array([default_grip_force(d, robot=robot) for d in demonstrations])
 
 
-def own_force(demonstration: Demonstration, *, robot: bool) -> float:
+def default_grip_force(demonstration: Demonstration, *, robot: bool) -> float:
     """The force (N) of a demonstration's grip: its type's, or where it is of none what the object's weight asks for.
 
     Pads of a robot press as people's did in the demonstrations, for which its grasps are tried. A person's press with
@@ -73,29 +71,12 @@ def grip_table(
     people = people_of(hands)
     if people is None:
         bodies, told = [body_of(hand) for hand in hands], np.asarray(targets, float)
-        return jnp.asarray(robot_grips(demonstrations, bodies, told, forces, gains, wrap_torque), jnp.float32)
+        return jnp.asarray(model_grips(demonstrations, bodies, told, forces, gains, wrap_torque), jnp.float32)
     grip = _grips_of_people(demonstrations, people, targets, forces, gains, wrap_torque)
     frames = targets.shape[1]
     whole = np.ones(frames)
-    ramps = [closing_ramp(d, frames, _RAMP) if d.grasp == RECORDED else whole for d in demonstrations]
+    ramps = [closing_ramp(d, frames, SETS_IN) if d.grasp == RECORDED else whole for d in demonstrations]
     return grip * jnp.asarray(np.stack(ramps), jnp.float32)[..., None]
-
-
-def robot_grips(
-    demonstrations: Sequence[Demonstration],
-    bodies: Sequence[Body],
-    targets: Float[np.ndarray, "d t u"],
-    forces: Float[np.ndarray, "d"],
-    gains: Gains,
-    wrap_torque: float,
-) -> Float[np.ndarray, "d t u"]:
-    """`grip_table` of robots, for which the grip begins shortly before the object moves in all demonstrations.
-
-    J^T f moves a tip that does not touch yet aside as well, and controllers bring it late: thumbs went 8 mm up and
-    pressed cubes down by their edges.
-    """
-    ramps = np.stack([closing_ramp(d, targets.shape[1], _RAMP) for d in demonstrations])
-    return model_grips(demonstrations, bodies, targets, forces, gains, wrap_torque) * ramps[..., None]
 
 
 def _grips_of_people(

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import expit
 
+from envs.grip_force import SETS_IN, closing_ramp
 from envs.scene import NUM_WRIST, OBJECT, demonstration_spec
 from mjx_hand.bodies.body import Body
 from mjx_hand.bodies.closing import closing_directions
@@ -16,8 +17,9 @@ from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.rigid.gains import Gains
 
 NEAR = 0.007  # m: a link nearer than this is taken to touch
+FLOATS = 0.02  # m that recorded objects stand above their table at most
 _SHARP = 0.001  # m, over which that fades
-_FAR = 0.02  # m, beyond which nobody asks how far
+_FAR, _EVER = 0.02, 10.0  # m, beyond which nobody asks how far: of links, and of the ground
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
 # Fingers besides those that oppose: with three that touch with two links each a hand wraps, a pinch has two of them. A
 # hand with fewer wraps with all of them.
@@ -57,6 +59,11 @@ class Touch:
         self.data.qpos[: len(coordinates)], self.data.qpos[len(coordinates) :] = coordinates, object_pose
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
+
+    def off_ground(self) -> float:
+        """How far the object is off table and support (m)."""
+        pairs = itertools.product(self.object, self.ground)
+        return min(mujoco.mj_geomDistance(self.model, self.data, *pair, _EVER, None) for pair in pairs)
 
     def nearest(
         self, most: float = _FAR, others: Sequence[int] | None = None
@@ -149,6 +156,10 @@ def model_grips(
     As `envs.grip.grip_offsets`: one damped step that closes the gaps of links that touch, and J^T f / kp, where the
     opposing fingers press with the force and the others share as much. A hand that wraps, three of whose other fingers
     (or all, of two) touch with two links each, closes with `wrap_torque` of its joints' limits instead.
+
+    All this sets in in the last 0.3 s before the object moves: J^T f moves a tip that does not touch yet aside as well,
+    and controllers bring it late (thumbs went 8 mm up and pressed cubes down by their edges). An object that is held in
+    the air from the beginning is pressed from then on.
     """
     grips = np.zeros_like(targets)
     for k, (d, body) in enumerate(zip(demonstrations, bodies, strict=True)):
@@ -157,10 +168,14 @@ def model_grips(
         model = demonstration_spec(d, body).compile()
         press = Press(Touch(model, body), body, float(forces[k]), gains, wrap_torque)
         coordinates = hand_coordinates(model, targets[k])
+        press.touch.place(coordinates[0], d.object_pose[0])
+        stands = press.touch.off_ground() < FLOATS
         for t in range(d.num_frames):
             press.touch.place(coordinates[t], d.object_pose[t])
             grips[k, t, NUM_WRIST:] = press.offsets()
         grips[k, d.num_frames :] = grips[k, d.num_frames - 1]
+        if stands:
+            grips[k] *= closing_ramp(d, targets.shape[1], SETS_IN)[:, None]
     return grips
 
 

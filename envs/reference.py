@@ -70,8 +70,7 @@ def make_reference(
     Args:
         demonstrations: in any order; kinds of object and grasp types may be mixed.
         hands: the twin's hand for each.
-        grip_force: of all (N); 0 replays them as they are, None takes that of each one's grasp type, or what the weight
-            of a recorded object asks for.
+        grip_force: of all (N); 0 replays them as they are, None takes `envs.grip_table.default_grip_force` of each.
         wrap_torque: share of the torque limits with which hands that wrap close (`envs.grip.grip_offsets`).
         gains: of the hand's position controllers.
         live: whether the hands are teleoperated (`Task.live`).
@@ -182,10 +181,9 @@ def anticipated(
     """
     kp = np.concatenate([[gains.wrist_slide[0]] * 3, [gains.wrist_turn[0]] * 3, gains.stiffness])
     kv = np.concatenate([[gains.wrist_slide[1]] * 3, [gains.wrist_turn[1]] * 3, gains.damping])
-    if isinstance(targets, np.ndarray):
-        return targets + (kv / kp - 0.5 / fps) * np.gradient(targets, 1 / fps, axis=1)
-    speed = jnp.asarray(jnp.gradient(targets, 1 / fps, axis=1))
-    return targets + jnp.asarray(kv / kp - 0.5 / fps, jnp.float32) * speed
+    xp = np if isinstance(targets, np.ndarray) else jnp
+    speed = xp.asarray(xp.gradient(targets, 1 / fps, axis=1))
+    return targets + xp.asarray(kv / kp - 0.5 / fps, targets.dtype) * speed
 
 
 def _ingredient(hand: RigidHand | Body) -> object:

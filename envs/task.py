@@ -34,7 +34,7 @@ class Task:
         random_start_prob: share of training episodes that start in the middle of a demonstration, at a state from its
             own assisted replay (reference-state initialisation); the rest start at frame 0.
         grip_force: force (N) with which the reference presses fingers that touch; 0 leaves demonstrations as they are,
-            null takes that of each demonstration's grasp type and of the hand (`envs.grip_table.own_force`).
+            null takes that of each demonstration's grasp type and of the hand (`envs.grip_table.default_grip_force`).
         wrap_torque: share of its torque limit with which each flexing joint closes where the reference's hand is around
             an object, three fingers touching it with two phalanges each; with 0, or a grip_force of 0, it does not.
         lookahead: how many frames ahead the policy sees the reference.

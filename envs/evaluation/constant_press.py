@@ -1,8 +1,9 @@
 """The constant press: a baseline that learns nothing and presses harder, with one strength for each grasp type.
 
 Pads press with the reference's own grip (`envs.grip`) at a constant force. Wraps add the torques that close the hand
-(`GraspType.closing`, which no policy is told), from before the object moves until the end. The strength of each type is
-the best of a grid on the training demonstrations.
+(`GraspType.closing`, which no policy is told), from before the object moves until the end. Where no type says how to
+press and the reference closes hands that wrap (`Task.wrap_torque`), its grip is made stronger. The strength of each
+type is the best of a grid on the training demonstrations.
 """
 
 import dataclasses
@@ -38,7 +39,8 @@ class ConstantPress:
 
     Attributes:
         env: the environment.
-        full: force (N) at full strength by type that presses with pads, None of those that wrap.
+        full: force (N) at full strength by type that presses with pads, None of those that wrap, and of none where the
+            reference closes hands that wrap.
         contact: hinge offsets (rad) that put pads on the surface.
         press: hinge offsets (rad) of full strength, before the controllers' limits.
     """
@@ -64,11 +66,16 @@ class ConstantPress:
 
     def described(self, strengths: Mapping[str, float]) -> dict[str, str]:
         """Each type's constant in words."""
-        return {
-            grasp: f"{share:.3g} × its closing torques" if full is None else f"{share * full:.3g} N"
-            for grasp, full in self.full.items()
-            for share in (strengths.get(grasp, 1.0),)
-        }
+        words = {}
+        for grasp, full in self.full.items():
+            share = strengths.get(grasp, 1.0)
+            if full is not None:
+                words[grasp] = f"{share * full:.3g} N"
+            elif grasp in grasp_names():
+                words[grasp] = f"{share:.3g} × its closing torques"
+            else:
+                words[grasp] = f"{share * _UNKNOWN_FULL:.3g} × the reference's grip"
+        return words
 
 
 def constant_press(env: TrackingEnv) -> ConstantPress:
@@ -82,7 +89,9 @@ def constant_press(env: TrackingEnv) -> ConstantPress:
     contact, one = (grip_table(*given, np.where(pressing >= 0, force, np.nan), env.gains) for force in (0.0, 1.0))
     press = np.array((one - contact) * np.nan_to_num(pressing)[:, None, None])
     for k, d in enumerate(env.demonstrations):
-        if full[d.grasp] is None:
+        if full[d.grasp] is None and d.grasp not in grasp_names():
+            press[k] = _UNKNOWN_FULL * (np.asarray(env.reference.grip[k]) - contact[k])
+        elif full[d.grasp] is None:
             ramp = closing_ramp(d, press.shape[1], _RAMP)
             press[k, :, NUM_WRIST:] = ramp[:, None] * _closing_torque(d, env) / env.gains.stiffness
     return ConstantPress(env, full, contact, jnp.asarray(press, jnp.float32))
@@ -128,8 +137,11 @@ def _closing_torque(demonstration: Demonstration, env: TrackingEnv) -> Float[np.
 
 
 def _full(demonstration: Demonstration, env: TrackingEnv, force: float) -> float | None:
-    """Newtons of full strength, or None where the demonstration's type wraps; `force` is the reference's own."""
+    """Newtons of full strength, or None where the type wraps or there is none and the reference closes what wraps.
+
+    `force` is the reference's own.
+    """
     if demonstration.grasp in grasp_names():
         closing = grasp_type(demonstration.grasp).closing
         return closing.force if isinstance(closing, Pads) else None
-    return _UNKNOWN_FULL * force
+    return None if env.task.wrap_torque else _UNKNOWN_FULL * force

@@ -98,7 +98,8 @@ class GraspType:
         approach: where the wrist comes from, relative to the grasp (world frame).
         closing: how the hand opens and presses.
         lift, carry, turn: ranges of height (m), sideways way (m) and rotation (rad).
-        grip_force: with which the reference of a twin presses (N), see `envs.grip`; demonstrations are made without.
+        grip_force: with which the reference of a person's twin presses (N), see `envs.grip`; demonstrations are made
+            without.
 
     Raises:
         InputError: objects of another kind.

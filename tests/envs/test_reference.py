@@ -1,12 +1,13 @@
 import dataclasses
 
+import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from envs.grasps import grasp_type
-from envs.reference import make_reference
+from envs.reference import anticipated, demonstrated_targets, make_reference
 from envs.scene import NUM_WRIST, base_rotation, demonstration_spec
 from mjx_hand.errors import InputError
 from mjx_hand.hand.joints import NUM_HINGES
@@ -161,3 +162,12 @@ def test_a_recorded_hand_presses_only_when_the_object_is_about_to_move(demonstra
         half = (begin + first) // 2
         share = (half - begin) / (first - begin)
         np.testing.assert_allclose(found[k, half], share * usual[k, half], rtol=1e-5, atol=1e-8)
+
+
+def test_targets_are_led_alike_by_jax_and_numpy(demonstrations):
+    """Rehearsals take NumPy's, which compiles nothing."""
+    targets = demonstrated_targets(demonstrations[0])[None]
+    found = anticipated(targets, Gains(), 50.0)
+    assert isinstance(found, np.ndarray)
+    np.testing.assert_allclose(found, np.asarray(anticipated(jnp.asarray(targets), Gains(), 50.0)), atol=1e-5)
+    assert np.abs(found - targets).max() > 1e-3

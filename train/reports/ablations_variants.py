@@ -55,8 +55,8 @@ VARIANTS = (
         ("data.capture.refine=tips",),
     ),
     Variant("no grip", "grip", "The residual alone must press.", ("task.grip_force=0",)),
-    Variant("grip of 1 N", "grip", "Lighter than the type's own where pads press.", ("task.grip_force=1",)),
-    Variant("grip of 4 N", "grip", "Harder than the type's own where pads press.", ("task.grip_force=4",)),
+    Variant("grip of 1 N", "grip", "Lighter than a person's own where pads press.", ("task.grip_force=1",)),
+    Variant("grip of 4 N", "grip", "Harder than a person's own where pads press.", ("task.grip_force=4",)),
     Variant("wraps press", "grip", "A hand around an object presses like any other.", ("task.wrap_torque=0",)),
     Variant(
         "no rotation reward",

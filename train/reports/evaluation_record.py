@@ -15,7 +15,7 @@ from envs.demonstrations.on_robot import robot_set
 from envs.demonstrations.set_settings import fingerprint, sealed_folder, set_folder
 from envs.evaluation.evaluate import Evaluation
 from envs.evaluation.people import people_of, person_scores
-from envs.grasps import grasp_names, grasp_type
+from envs.grasps import Pads, grasp_names, grasp_type
 from mjx_hand.bodies.human_body import HUMAN
 from mjx_hand.files.digests import digest
 from mjx_hand.files.npz_archive import replacing
@@ -122,10 +122,12 @@ def evaluation_fingerprint(configs: Sequence[Config]) -> str:
         sets = [folder(settings, config.demonstrations).name for settings in config.data.expand_types()]
         if config.data.folder:
             sets += [part_digest(config.data.folder, part) for part in PARTS]
-        forces = [grasp_type(name).grip_force for name in grasp_names()]
+        types = [grasp_type(name) for name in grasp_names()]
+        forces = [grasp.grip_force for grasp in types]
         told = [config.name, config.part, config.engine, config.seed, sets, forces, parts]
         if config.hand != HUMAN:
-            told.append([config.hand, robot_set.METHOD])
+            pressed = [grasp.closing.force for grasp in types if isinstance(grasp.closing, Pads)]
+            told.append([config.hand, robot_set.METHOD, pressed])
         pieces.append(json.dumps(told, sort_keys=True).encode())
         policy = Path(config.checkpoint) if config.checkpoint else Path(config.out) / "best.npz"
         for path in (policy, Path(config.out) / "curve.csv"):

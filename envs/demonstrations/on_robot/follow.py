@@ -1,8 +1,8 @@
 """A robot hand's way to its grasp, with the object, and away again.
 
 The wrist goes as the person's went, from the grasp on and from it back, and in each frame pads are where the person's
-were. Before they touch, no link comes near the object: what a controller brings late, or a thick finger beside its
-pad, would knock it over.
+were, and straight in front of their faces before they touch. Until then no link comes near the object: what a
+controller brings late, or a thick finger beside its pad, would knock it over.
 """
 
 import numpy as np
@@ -31,7 +31,9 @@ def follow(scene: RobotScene, grasp: Float[np.ndarray, "u"]) -> Float[np.ndarray
     ways = followed_places(pads, np.array([near[k][1] for k in wanted]), scene.demonstration)
     wrist = _carried(scene, grasp[:NUM_WRIST])
     touches = _touches(scene)
-    ways += _outward(scene, touches)
+    # Of a hand that wraps nobody says which face a link meets.
+    inward = np.array([near[k][2] for k in wanted]) if pads.wraps else pads.inward
+    ways += _outward(scene, inward, touches)
     clear = _clearances(scene, touches)
     loose = np.stack([_FREE * (_PAD / _FREE) ** touches[finger] for finger in pads.fingers], axis=1)
     unit = np.eye(scene.count)
@@ -77,14 +79,21 @@ def _touches(scene: RobotScene) -> dict[str, Float[np.ndarray, "t"]]:
     return fingers | {"": still_near(np.asarray(pads.touching.any(axis=1)), fps)}
 
 
-def _outward(scene: RobotScene, touches: dict[str, Float[np.ndarray, "t"]]) -> Float[np.ndarray, "t f 3"]:
+def _outward(
+    scene: RobotScene, inward: Float[np.ndarray, "f 3"], touches: dict[str, Float[np.ndarray, "t"]]
+) -> Float[np.ndarray, "t f 3"]:
     """How far each pad is straight off its face before it touches, and after (m, world).
 
     The nearest way off a face may lead around an edge: thumbs that came from above were caught on it.
+
+    Args:
+        scene: the robot's.
+        inward: ways into the object at the grasp (world).
+        touches: how much each finger touches.
     """
     pads = scene.pads
     turn = Rotation.from_quat(scene.demonstration.object_pose[:, 3:], scalar_first=True)
-    seen = turn[pads.grasp].inv().apply(-pads.inward)
+    seen = turn[pads.grasp].inv().apply(-inward)
     off = np.stack([1 - touches[finger] for finger in pads.fingers], axis=1)
     return APPROACH * off[..., None] * np.stack([turn.apply(way) for way in seen], axis=1)
 

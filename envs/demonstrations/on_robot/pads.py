@@ -3,13 +3,12 @@
 import dataclasses
 from collections import Counter
 
-import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import binary_closing
 from scipy.spatial.transform import Rotation
 
-from envs.model_grip import NEAR, Touch
+from envs.model_grip import FLOATS, NEAR, Touch
 from envs.reference import demonstrated_targets
 from envs.scene import demonstration_spec
 from mjx_hand.bodies.coordinates import hand_coordinates
@@ -19,9 +18,8 @@ from mjx_hand.motion.gaps import spans
 from mjx_hand.rigid.rigid_hand import RigidHand
 
 _FLICKER = 0.2  # s, in which a finger that touches does not come off and back
-_ALOFT = 0.005  # m higher off table and support than at the beginning, where the object is in the air
+_IN_AIR = 0.005  # m higher off table and support than at the beginning, where the object is in the air
 _LET_GO = 0.01  # m that a pad moves on the object as it lets go in the air; capture noise moved pads by up to 5 mm
-_FAR = 1.0  # m off table and support, beyond which it is not asked how far
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,7 +33,7 @@ class Pads:
         inward: unit way from each pad into the object, at `grasp`.
         touching: whether each of these fingers touches; gaps of less than 0.2 s, as recordings have them, are filled,
             and others in the air unless the pad moves away by more than 1 cm: what is held stays held.
-        aloft: whether the object is in the air.
+        in_air: whether the object is off table and support.
         tips: of all five fingers, by name.
         grasp: the frame.
         wraps: whether more than pads touch then, of three fingers and more: the palm, or all three phalanges of two.
@@ -46,7 +44,7 @@ class Pads:
     surface: Float[np.ndarray, "f 3"]
     inward: Float[np.ndarray, "f 3"]
     touching: Bool[np.ndarray, "t f"]
-    aloft: Bool[np.ndarray, "t"]
+    in_air: Bool[np.ndarray, "t"]
     tips: dict[str, np.ndarray]
     grasp: int
     wraps: bool
@@ -90,7 +88,7 @@ def demonstrated_pads(demonstration: Demonstration, person: RigidHand) -> Pads:
     off_ground = np.empty(demonstration.num_frames)
     for frame in range(demonstration.num_frames):
         touch.place(coordinates[frame], demonstration.object_pose[frame])
-        off_ground[frame] = _off_ground(touch)
+        off_ground[frame] = touch.off_ground()
         for k, (number, place) in enumerate(on_links):
             places[frame, k] = touch.in_world(number, place)
         for finger, site in sites.items():
@@ -98,27 +96,22 @@ def demonstrated_pads(demonstration: Demonstration, person: RigidHand) -> Pads:
     near = np.array([[finger in found.get(frame, ()) for finger in fingers] for frame in range(len(places))])
     filled = np.ones((round(_FLICKER * demonstration.motion.fps), 1), bool)
     touching = binary_closing(np.pad(near, ((len(filled), len(filled)), (0, 0)), mode="edge"), filled)
-    touching, aloft = touching[len(filled) : -len(filled)], off_ground > off_ground[0] + _ALOFT
+    touching, in_air = touching[len(filled) : -len(filled)], off_ground > min(off_ground[0], FLOATS) + _IN_AIR
     turn = Rotation.from_quat(demonstration.object_pose[:, 3:], scalar_first=True).inv()
     for k in range(len(fingers)):
         own = turn.apply(places[:, k] - demonstration.object_pose[:, :3])
-        touching[:, k] |= held_on(touching[:, k], own, aloft)
+        touching[:, k] |= stays_held(touching[:, k], own, in_air)
     inward = np.stack([way for *_, way in held])
-    return Pads(fingers, places, surface, inward, touching, aloft, tips, grasp, wraps)
+    return Pads(fingers, places, surface, inward, touching, in_air, tips, grasp, wraps)
 
 
-def _off_ground(touch: Touch) -> float:
-    """How far the object is off table and support (m)."""
-    pairs = ((one, other) for one in touch.object for other in touch.ground)
-    return min(mujoco.mj_geomDistance(touch.model, touch.data, *pair, _FAR, None) for pair in pairs)
-
-
-def held_on(
-    touching: Bool[np.ndarray, "t"], pad: Float[np.ndarray, "t 3"], aloft: Bool[np.ndarray, "t"]
+def stays_held(
+    touching: Bool[np.ndarray, "t"], pad: Float[np.ndarray, "t 3"], in_air: Bool[np.ndarray, "t"]
 ) -> Bool[np.ndarray, "t"]:
-    """Gaps in the air in which a pad (m, seen from the object) stays where it touched."""
+    """Frames of gaps, from the air on up to the ground, in which a pad (m, on the object) stays where it touched."""
     held = np.zeros_like(touching)
     for first, end in spans(~touching):
-        if first and aloft[first:end].all():
-            held[first:end] = np.linalg.norm(pad[first:end] - pad[first - 1], axis=1).max() < _LET_GO
+        landed = first + int(np.argmin(np.append(in_air[first:end], False)))
+        if first and landed > first:
+            held[first:landed] = np.linalg.norm(pad[first:landed] - pad[first - 1], axis=1).max() < _LET_GO
     return held

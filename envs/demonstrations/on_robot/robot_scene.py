@@ -41,7 +41,7 @@ class RobotScene:
         self.demonstration, self.body = demonstration, body
         pads = shared_pads(demonstrated_pads(demonstration, person), body)
         sides = np.isin(pads.fingers, body.opposing)
-        touching = opposed(pads.touching, sides, demonstration.object_pose[:, :3], pads.aloft)
+        touching = opposed(pads.touching, sides, demonstration.object_pose[:, :3], pads.in_air)
         self.pads = dataclasses.replace(pads, touching=touching)
         self.base = base_rotation(demonstration)
         motion = demonstration.motion

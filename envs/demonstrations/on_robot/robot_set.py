@@ -17,7 +17,7 @@ from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.progress import counter
 from mjx_hand.rigid.rigid_hand import RigidHand
 
-METHOD = 3  # how references come about: counted up where they change, so that results on others are made anew
+METHOD = 4  # how references come about: counted up where they change, so that results on others are made anew
 _MOTION = ("angles", "wrist_position", "wrist_quaternion")
 
 

@@ -45,7 +45,7 @@ def opposed(
     touching: Bool[np.ndarray, "t f"],
     opposing: Bool[np.ndarray, "f"],
     place: Float[np.ndarray, "t 3"],
-    aloft: Bool[np.ndarray, "t"],
+    in_air: Bool[np.ndarray, "t"],
 ) -> Bool[np.ndarray, "t f"]:
     """Which fingers touch, without those that are alone on their side of an object that stands.
 
@@ -55,10 +55,10 @@ def opposed(
         touching: of each finger.
         opposing: which fingers oppose the others.
         place: of the object (m).
-        aloft: whether it is in the air.
+        in_air: whether it is in the air.
     """
     at_rest = np.minimum(*(np.linalg.norm(place - place[end], axis=1) for end in (0, -1))) < _AT_REST
-    stands = at_rest & ~aloft
+    stands = at_rest & ~in_air
     both = touching[:, opposing].any(axis=1) & touching[:, ~opposing].any(axis=1)
     return touching & (both | ~stands)[:, None]
 

@@ -17,8 +17,8 @@ from scipy.spatial.transform import Rotation
 
 from envs.demonstrations.on_robot.robot_scene import RobotScene
 from envs.grip_force import RECORDED
-from envs.grip_table import own_force, robot_grips
-from envs.model_grip import Press
+from envs.grip_table import default_grip_force
+from envs.model_grip import Press, model_grips
 from envs.physics.native import diverged
 from envs.physics.solver import gauss_seidel
 from envs.reference import anticipated, demonstrated_targets
@@ -56,14 +56,14 @@ class Rehearsal:
         return self.until == 1 and self.turned < _TURNED
 
     @property
-    def score(self) -> tuple[float, float]:
-        """Higher is better: held longer, then nearer to the demonstrated pose."""
-        return self.until, -self.moved / _DISTANCE - self.turned / _ANGLE
+    def score(self) -> tuple[float, float, float]:
+        """Higher is better: held longer, then not turned, then nearer to the demonstrated pose."""
+        return self.until, float(self.held), -self.moved / _DISTANCE - self.turned / _ANGLE
 
 
 def trial_task(demonstration: Demonstration) -> Task:
     """The task of a rehearsal; of a recording as its experiments have it, the hand passing through table and itself."""
-    force = own_force(demonstration, robot=True)
+    force = default_grip_force(demonstration, robot=True)
     if demonstration.grasp == RECORDED:
         return Task(grip_force=force, contacts="object")
     return Task(grip_force=force)
@@ -79,9 +79,12 @@ def slip(scene: RobotScene, targets: Float[np.ndarray, "u"]) -> float:
     Returns:
         Infinity where the simulation diverges.
     """
-    force, task = own_force(scene.demonstration, robot=True), trial_task(scene.demonstration)
+    force, wrap_torque = (
+        default_grip_force(scene.demonstration, robot=True),
+        trial_task(scene.demonstration).wrap_torque,
+    )
     scene.place(targets, scene.pads.grasp)
-    press = Press(scene.touch, scene.body, force, scene.body.gains, task.wrap_torque)
+    press = Press(scene.touch, scene.body, force, scene.body.gains, wrap_torque)
     start = scene.touch.data.qpos.copy()
     model = scene.trial_model
     data = mujoco.MjData(model)
@@ -111,7 +114,7 @@ def rehearse(demonstration: Demonstration, body: Body) -> Rehearsal:
     check_rate(demonstration.motion.fps, task.substeps * TIMESTEP)
     # As `make_reference`, which JAX would compile anew for each number of frames.
     targets, force = demonstrated_targets(demonstration)[None], np.array([task.grip_force])
-    grip = robot_grips([demonstration], [body], targets, force, body.gains, task.wrap_torque)
+    grip = model_grips([demonstration], [body], targets, force, body.gains, task.wrap_torque)
     controls = (anticipated(targets, body.gains, demonstration.motion.fps) + grip)[0]
     (model,) = gauss_seidel([demonstration_spec(demonstration, body, contacts=task.contacts).compile()])
     data, pose = mujoco.MjData(model), demonstration.object_pose

@@ -22,7 +22,7 @@ from envs.demonstrations.on_robot.trial import Rehearsal
 from envs.demonstrations.set_settings import SetSettings
 from envs.grip_force import closing_ramp
 from envs.grip_table import grip_table
-from envs.model_grip import NEAR, Touch
+from envs.model_grip import NEAR, Press, Touch
 from envs.reference import demonstrated_targets
 from envs.scene import OBJECT, demonstration_spec
 from mjx_hand.bodies.coordinates import hand_coordinates
@@ -118,11 +118,42 @@ def test_pads_come_straight_to_their_faces(brought, demonstrations, hands, alleg
 def test_the_grip_sets_in_shortly_before_the_object_moves(brought, allegro):
     """Before that fingers may touch, and do not press: J^T f of a tip that is still off takes it aside as well."""
     d = brought.demonstration
-    given = [d], [allegro], jnp.asarray(demonstrated_targets(d))[None], np.array([12.0]), allegro.gains
-    grip = np.abs(np.asarray(grip_table(*given))[0]).max(axis=1)
-    ramp = closing_ramp(d, len(grip), 0.3)
-    assert (grip[ramp == 0] == 0).all()
-    assert (grip[ramp > 0.2] > 0).all()
+    moves = int(np.argmax(closing_ramp(d, d.num_frames, 1e-3) > 0))
+    for seconds, share in ((0.4, 0.0), (0.3, 0.0), (0.16, 7 / 15), (0.0, 1.0)):
+        frame = moves - round(seconds * d.motion.fps)
+        found = np.asarray(grip_table([d], [allegro], targets_of(d), np.array([12.0]), allegro.gains))[0, frame]
+        np.testing.assert_allclose(found[6:], share * touching_grip(d, allegro, frame), atol=1e-6)
+    assert np.abs(touching_grip(d, allegro, moves)).max() > 0.01
+
+
+def test_what_is_in_the_air_from_the_beginning_is_pressed_from_then_on(brought, allegro):
+    """As where a recording begins with the object in the hand, which keeps still at first."""
+    d = brought.demonstration
+    high = int(np.argmax(d.object_pose[:, 2] > d.object_pose[0, 2] + 0.05))
+    still = np.r_[[high] * 50, high : d.num_frames]
+    motion = replace(
+        d.motion,
+        angles=d.motion.angles[still],
+        wrist_position=d.motion.wrist_position[still],
+        wrist_quaternion=d.motion.wrist_quaternion[still],
+        valid=d.motion.valid[still],
+    )
+    d = replace(d, motion=motion, object_pose=d.object_pose[still])
+    grip = np.asarray(grip_table([d], [allegro], targets_of(d), np.array([12.0]), allegro.gains))[0]
+    np.testing.assert_allclose(grip[0, 6:], touching_grip(d, allegro, 0), atol=1e-6)
+    assert np.abs(grip[0]).max() > 0.01
+
+
+def targets_of(d):
+    return jnp.asarray(demonstrated_targets(d))[None]
+
+
+def touching_grip(d, body, frame: int) -> np.ndarray:
+    """What presses with 12 N where the hand is in a frame."""
+    model = demonstration_spec(d, body).compile()
+    press = Press(Touch(model, body), body, 12.0, body.gains, 0.0)
+    press.touch.place(hand_coordinates(model, demonstrated_targets(d)[frame]), d.object_pose[frame])
+    return press.offsets()
 
 
 def test_no_link_is_in_table_or_support(brought, allegro):
@@ -217,10 +248,15 @@ def test_what_slips_least_is_rehearsed_first(until, turned, most, demonstrations
 
 
 def test_the_grasp_that_is_best_in_rehearsal_is_taken(demonstrations, hands, allegro, monkeypatch):
-    """Of four at most, and no more are rehearsed once the object stays near; an object that is lost later is better
-    than one that is lost sooner, however far it strays."""
+    """No more are rehearsed once the object stays near, nor beyond four once it is held; an object that is lost later
+    is better than one that is lost sooner, however far it strays, and one that is turned worse than one that is not."""
     told = [Rehearsal(0.5, 0.02, 0.1), Rehearsal(1.0, 0.05, 0.4), Rehearsal(1.0, 0.05, 0.2), Rehearsal(0.9, 0.01, 0.0)]
-    for script, chosen, rehearsed in ((told, 2, 4), ([told[1], Rehearsal(1.0, 0.009, 0.2), *told], 1, 2)):
+    lost, turned = told[0], Rehearsal(1.0, 0.02, 0.45)
+    for script, chosen, rehearsed in (
+        (told, 2, 4),
+        ([told[1], Rehearsal(1.0, 0.009, 0.2), *told], 1, 2),
+        ([lost, turned, lost, lost, turned, told[2], turned], 5, 6),
+    ):
         made = []
         monkeypatch.setattr(bring, "follow", lambda scene, grasp: np.tile(grasp, (scene.demonstration.num_frames, 1)))
         monkeypatch.setattr(bring, "rehearse", lambda d, body: made.append(d) or script[len(made) - 1])  # noqa: B023

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from envs.demonstrations.on_robot import pads as pads_module
-from envs.demonstrations.on_robot.pads import demonstrated_pads, held_on
+from envs.demonstrations.on_robot.pads import demonstrated_pads, stays_held
 from envs.demonstrations.twin_hands import twins
 from mjx_hand.hand.joints import HINGES
 from mjx_hand.motion.demonstration import load_demonstration
@@ -37,10 +37,10 @@ def test_in_the_air_a_finger_lets_go_only_where_it_moves_away(opened, holds, mon
     d = replace(d, motion=replace(d.motion, angles=angles))
     hand = twins([d])[0]
     found = demonstrated_pads(d, hand)
-    assert found.aloft[frames].all()
-    assert not found.aloft[:10].any()
+    assert found.in_air[frames].all()
+    assert not found.in_air[:10].any()
     assert found.touching[frames, found.fingers.index("thumb")].all() == holds
-    monkeypatch.setattr(pads_module, "held_on", lambda touching, pad, aloft: np.zeros_like(touching))
+    monkeypatch.setattr(pads_module, "stays_held", lambda touching, pad, in_air: np.zeros_like(touching))
     assert not demonstrated_pads(d, hand).touching[frames, 0].any(), "the thumb was not off"
 
 
@@ -49,8 +49,9 @@ def test_what_is_let_go_where_the_object_stands_is_let_go():
     t = np.arange(60)
     touching = ((t >= 10) & (t < 20)) | ((t >= 30) & (t < 40))
     still = np.zeros((60, 3))
-    np.testing.assert_array_equal(held_on(touching, still, np.ones(60, bool)), (t >= 10) & ~touching)
-    np.testing.assert_array_equal(held_on(touching, still, t < 35), (t >= 20) & (t < 30))
-    np.testing.assert_array_equal(held_on(touching, still, t > 25), t >= 40)
+    np.testing.assert_array_equal(stays_held(touching, still, np.ones(60, bool)), (t >= 10) & ~touching)
+    np.testing.assert_array_equal(stays_held(touching, still, t < 35), (t >= 20) & (t < 30))
+    np.testing.assert_array_equal(stays_held(touching, still, t < 50), (t >= 20) & (t < 50) & ~touching)
+    np.testing.assert_array_equal(stays_held(touching, still, t > 25), t >= 40)
     leaves = np.stack([0.002 * (t - 39).clip(0), 0.0 * t, 0.0 * t], axis=1)
-    np.testing.assert_array_equal(held_on(touching, leaves, np.ones(60, bool)), (t >= 20) & (t < 30))
+    np.testing.assert_array_equal(stays_held(touching, leaves, np.ones(60, bool)), (t >= 20) & (t < 30))

@@ -54,5 +54,5 @@ def test_no_finger_touches_alone_what_stands():
     np.testing.assert_array_equal(found[:, 0], (t >= 20) & (t < 80))
     np.testing.assert_array_equal(found[:, 1], index)
     np.testing.assert_array_equal(found[:, 2], ring)
-    ends_aloft = opposed(fingers[:60], opposing, place[:60], height[:60] > 0.005)  # held at the end of the recording
-    np.testing.assert_array_equal(ends_aloft[40:, 0], thumb[40:60])
+    ends_in_air = opposed(fingers[:60], opposing, place[:60], height[:60] > 0.005)  # held at the end of the recording
+    np.testing.assert_array_equal(ends_in_air[40:, 0], thumb[40:60])

@@ -12,7 +12,7 @@ from envs.evaluation.metrics import position_error, rotation_error
 from envs.evaluation.roll_out import make_roll_out, zero_residual
 from envs.grasps import grasp_type
 from envs.grip_force import RECORDED, grip_force_of
-from envs.grip_table import grip_forces, own_force
+from envs.grip_table import default_grip_force, grip_forces
 from envs.task import Task
 from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
@@ -24,13 +24,13 @@ FORCE = 12.0  # N, with which demonstrations of pinches are made
 def test_the_force_is_that_of_the_demonstrations(demonstrations):
     """Of a person's pinch the reference has less, to which a policy adds."""
     d = demonstrations[1]
-    assert own_force(d, robot=True) == FORCE
-    assert own_force(d, robot=False) == grasp_type("pinch").grip_force < FORCE
+    assert default_grip_force(d, robot=True) == FORCE
+    assert default_grip_force(d, robot=False) == grasp_type("pinch").grip_force < FORCE
     for robot in (True, False):
-        assert own_force(replace(d, grasp="power"), robot=robot) == grasp_type("power").grip_force
+        assert default_grip_force(replace(d, grasp="power"), robot=robot) == grasp_type("power").grip_force
         weight = grip_force_of(d.object.mass, d.object.friction)
-        assert own_force(replace(d, grasp=RECORDED), robot=robot) == weight
-        assert own_force(replace(d, grasp="mine"), robot=robot) == weight
+        assert default_grip_force(replace(d, grasp=RECORDED), robot=robot) == weight
+        assert default_grip_force(replace(d, grasp="mine"), robot=robot) == weight
     assert trial_task(replace(d, grasp=RECORDED)) == Task(grip_force=weight, contacts="object")
     assert trial_task(d) == Task(grip_force=FORCE)
 

@@ -227,3 +227,5 @@ def test_what_was_measured_to_differ_by_hand_does():
     assert compose(recording).task.wrap_torque == 0.0
     assert compose([*recording, "hand=allegro"]).task.wrap_torque == 0.5
     assert compose([*recording, "hand=allegro", "task.wrap_torque=0.3"]).task.wrap_torque == 0.3
+    assert compose(["config=pinch_demo"]).task.grip_force == 8
+    assert compose(["config=pinch_demo", "hand=allegro"]).task.grip_force is None
