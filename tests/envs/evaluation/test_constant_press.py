@@ -4,18 +4,30 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from envs.demonstrations.on_robot.bring import on_robot
 from envs.evaluation import constant_press as module
 from envs.evaluation.constant_press import constant_press, search_press
 from envs.evaluation.evaluate import evaluate
 from envs.evaluation.roll_out import make_roll_out, zero_residual
 from envs.grasps import grasp_type
 from envs.grasps.grasp_type import Pads, Wrap
+from envs.grip_force import RECORDED, grip_force_of
 from envs.scene import NUM_WRIST
+from envs.task import Task
 from envs.tracking import TrackingEnv
+from mjx_hand.bodies.robot_body import robot_body
 from mjx_hand.hand.joints import HINGES
 from mjx_hand.pytree import replace
+from tests.robots.urdfs import urdf_of
 
 PINCH = grasp_type("pinch")
+
+
+@pytest.fixture(scope="module")
+def allegro_pinch(demonstrations, hands):
+    assert urdf_of("allegro").is_file()  # skips without the package that carries it
+    body = robot_body("allegro")
+    return on_robot(demonstrations[1], hands[1], body).demonstration, body
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +53,7 @@ def test_recordings_are_pressed_as_hard_as_their_weight_asks_for(env):
     """No grasp type says how hard. The grid must reach what carries them, or the baseline beside a policy is weak."""
     other = env.with_tables(env.tables)
     other.demonstrations = tuple(replace(d, grasp="recorded") for d in env.demonstrations)
+    other.task = dataclasses.replace(env.task, wrap_torque=0.0)  # as experiments of people's recordings have it
     weights = [9.81 * d.object.mass / d.object.friction for d in env.demonstrations]
     assert env.task.grip_force is None
     pressed = constant_press(other)
@@ -97,3 +110,19 @@ def test_a_type_that_training_lacks_is_pressed_at_full_strength(env, press):
     np.testing.assert_array_equal(press.tables({}).reference.grip, press.tables({"pinch": 1.0}).reference.grip)
     assert not np.array_equal(press.tables({"pinch": 0.5}).reference.grip, press.tables({}).reference.grip)
     assert jnp.isfinite(press.tables({}).reference.controls).all()
+
+
+def test_a_robots_grip_on_a_recorded_object_is_made_stronger(demonstrations, allegro_pinch):
+    """No type says how to press it: a quarter of full strength is the reference's own grip, and wraps close with it."""
+    d, body = allegro_pinch
+    recorded = replace(d, grasp=RECORDED)
+    env = TrackingEnv([recorded], [body], "native", Task(contacts="object"))
+    made = constant_press(env)
+    own = made.tables({RECORDED: 0.25}).reference
+    np.testing.assert_allclose(own.grip, env.reference.grip, atol=1e-5)
+    stronger = np.abs(np.asarray(made.tables({RECORDED: 0.5}).reference.grip)).sum()
+    assert stronger > 1.2 * np.abs(np.asarray(own.grip)).sum()
+    assert made.described({RECORDED: 0.25}) == {RECORDED: "1 × the reference's grip"}
+    without = constant_press(TrackingEnv([recorded], [body], "native", Task(contacts="object", wrap_torque=0.0)))
+    weight = grip_force_of(d.object.mass, d.object.friction)
+    assert without.described({RECORDED: 0.25}) == {RECORDED: f"{weight:.3g} N"}
