@@ -6,6 +6,7 @@ import jax
 import numpy as np
 import pytest
 
+from envs.grip_force import closing_ramp
 from envs.model_grip import model_grips
 from envs.reference import demonstrated_targets, make_reference
 from envs.scene import NUM_WRIST, scene_spec
@@ -58,7 +59,7 @@ def test_a_reference_by_mujoco_is_that_of_the_capsules(demonstrations, hands, bo
 
 
 def test_a_body_that_wraps_closes_with_what_its_joints_can(demonstrations, bodies):
-    """The hand in the object: every link touches. Far from it none does, and nothing is asked for."""
+    """The hand in the object: every link touches, and closes when the object is about to move. Far from it none does, and nothing is asked for."""
     d, gains = demonstrations[0], bodies[0].gains
     around = dataclasses.replace(d.object, kind="sphere", size=np.full(3, 0.3))
     inside = np.concatenate([d.motion.wrist_position, d.object_pose[:, 3:]], axis=1)
@@ -68,7 +69,9 @@ def test_a_body_that_wraps_closes_with_what_its_joints_can(demonstrations, bodie
         found = model_grips([told], bodies[:1], targets, np.array([8.0]), gains, wrap_torque=0.5)[0, :, NUM_WRIST:]
         flexes = np.array([name.endswith("_flexion") for name in HINGES])
         closed = 0.5 * flexes * gains.force_limit / gains.stiffness
-        np.testing.assert_allclose(found, np.broadcast_to(closed * closes, found.shape), atol=2e-4)
+        sets_in = closing_ramp(told, len(found), 0.3)[:, None]
+        np.testing.assert_allclose(found, closes * sets_in * closed, atol=2e-4)
+    assert (sets_in == 1).any()
 
 
 def test_no_grip_where_none_is_asked_for(demonstrations, bodies):
