@@ -59,7 +59,8 @@ def test_a_reference_by_mujoco_is_that_of_the_capsules(demonstrations, hands, bo
 
 
 def test_a_body_that_wraps_closes_with_what_its_joints_can(demonstrations, bodies):
-    """The hand in the object: every link touches, and closes when the object is about to move. Far from it none does, and nothing is asked for."""
+    """The hand in the object: every link touches, and closes when the object is about to move. Far from it none does,
+    and nothing is asked for."""
     d, gains = demonstrations[0], bodies[0].gains
     around = dataclasses.replace(d.object, kind="sphere", size=np.full(3, 0.3))
     inside = np.concatenate([d.motion.wrist_position, d.object_pose[:, 3:]], axis=1)
