@@ -32,7 +32,7 @@ def least_contact_force(model: mujoco.MjModel) -> float:
 
 
 def closing_ramp(demonstration: Demonstration, frames: int, seconds: float) -> Float[np.ndarray, "{frames}"]:
-    """From 0 to 1 in these seconds before the object first moves, and 1 from then on"""
+    """From 0 to 1 in these seconds before the object first moves, and 1 from then on."""
     pose = demonstration.object_pose
     turned = Rotation.from_quat(pose[:, 3:], scalar_first=True)
     away = np.linalg.norm(pose[:, :3] - pose[0, :3], axis=1) > _MOVED

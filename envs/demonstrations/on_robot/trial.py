@@ -79,12 +79,10 @@ def slip(scene: RobotScene, targets: Float[np.ndarray, "u"]) -> float:
     Returns:
         Infinity where the simulation diverges.
     """
-    force, wrap_torque = (
-        default_grip_force(scene.demonstration, robot=True),
-        trial_task(scene.demonstration).wrap_torque,
-    )
+    demonstration, body = scene.demonstration, scene.body
+    force = default_grip_force(demonstration, robot=True)
     scene.place(targets, scene.pads.grasp)
-    press = Press(scene.touch, scene.body, force, scene.body.gains, wrap_torque)
+    press = Press(scene.touch, body, force, body.gains, trial_task(demonstration).wrap_torque)
     start = scene.touch.data.qpos.copy()
     model = scene.trial_model
     data = mujoco.MjData(model)
