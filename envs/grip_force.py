@@ -9,7 +9,7 @@ from envs.scene import OBJECT
 from mjx_hand.motion.demonstration import Demonstration
 
 RECORDED = "recorded"  # what a demonstration that is of no grasp type calls its grasp
-SETS_IN = 0.3  # s before an object first moves, in which the grip of a recorded hand, or a robot's, sets in
+GRIP_RAMP = 0.3  # s before an object first moves, in which the grip of a recorded hand, or a robot's, sets in
 _GRAVITY = 9.81
 _MOVED, _TURNED = 0.002, np.deg2rad(2.0)  # m, rad from its first pose
 

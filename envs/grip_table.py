@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from envs.grasps import Pads, grasp_names, grasp_type
 from envs.grip import grip_offsets
-from envs.grip_force import RECORDED, SETS_IN, closing_ramp, grip_force_of
+from envs.grip_force import GRIP_RAMP, RECORDED, closing_ramp, grip_force_of
 from envs.model_grip import model_grips
 from envs.scene import NUM_WRIST
 from mjx_hand.bodies.body import Body
@@ -75,7 +75,7 @@ def grip_table(
     grip = _grips_of_people(demonstrations, people, targets, forces, gains, wrap_torque)
     frames = targets.shape[1]
     whole = np.ones(frames)
-    ramps = [closing_ramp(d, frames, SETS_IN) if d.grasp == RECORDED else whole for d in demonstrations]
+    ramps = [closing_ramp(d, frames, GRIP_RAMP) if d.grasp == RECORDED else whole for d in demonstrations]
     return grip * jnp.asarray(np.stack(ramps), jnp.float32)[..., None]
 
 

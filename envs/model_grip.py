@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import expit
 
-from envs.grip_force import SETS_IN, closing_ramp
+from envs.grip_force import GRIP_RAMP, closing_ramp
 from envs.scene import NUM_WRIST, OBJECT, demonstration_spec
 from mjx_hand.bodies.body import Body
 from mjx_hand.bodies.closing import closing_directions
@@ -17,9 +17,10 @@ from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.rigid.gains import Gains
 
 NEAR = 0.007  # m: a link nearer than this is taken to touch
-FLOATS = 0.02  # m that recorded objects stand above their table at most
+HOVER = 0.02  # m that recorded objects stand above their table at most
+ANYWHERE = 10.0  # m: however far
 _SHARP = 0.001  # m, over which that fades
-_FAR, _EVER = 0.02, 10.0  # m, beyond which nobody asks how far: of links, and of the ground
+_FAR = 0.02  # m, beyond which nobody asks how far
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
 # Fingers besides those that oppose: with three that touch with two links each a hand wraps, a pinch has two of them. A
 # hand with fewer wraps with all of them.
@@ -60,10 +61,10 @@ class Touch:
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
 
-    def off_ground(self) -> float:
+    def object_clearance(self) -> float:
         """How far the object is off table and support (m)."""
         pairs = itertools.product(self.object, self.ground)
-        return min(mujoco.mj_geomDistance(self.model, self.data, *pair, _EVER, None) for pair in pairs)
+        return min(mujoco.mj_geomDistance(self.model, self.data, *pair, ANYWHERE, None) for pair in pairs)
 
     def nearest(
         self, most: float = _FAR, others: Sequence[int] | None = None
@@ -169,13 +170,13 @@ def model_grips(
         press = Press(Touch(model, body), body, float(forces[k]), gains, wrap_torque)
         coordinates = hand_coordinates(model, targets[k])
         press.touch.place(coordinates[0], d.object_pose[0])
-        stands = press.touch.off_ground() < FLOATS
-        for t in range(d.num_frames):
+        stands = press.touch.object_clearance() < HOVER
+        ramp = closing_ramp(d, targets.shape[1], GRIP_RAMP) if stands else np.ones(targets.shape[1])
+        for t in np.flatnonzero(ramp[: d.num_frames]):
             press.touch.place(coordinates[t], d.object_pose[t])
             grips[k, t, NUM_WRIST:] = press.offsets()
         grips[k, d.num_frames :] = grips[k, d.num_frames - 1]
-        if stands:
-            grips[k] *= closing_ramp(d, targets.shape[1], SETS_IN)[:, None]
+        grips[k] *= ramp[:, None]
     return grips
 
 

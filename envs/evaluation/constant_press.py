@@ -90,7 +90,7 @@ def constant_press(env: TrackingEnv) -> ConstantPress:
     press = np.array((one - contact) * np.nan_to_num(pressing)[:, None, None])
     for k, d in enumerate(env.demonstrations):
         if full[d.grasp] is None and d.grasp not in grasp_names():
-            press[k] = _UNKNOWN_FULL * (np.asarray(env.reference.grip[k]) - contact[k])
+            press[k] = _UNKNOWN_FULL * np.asarray(env.reference.grip[k])
         elif full[d.grasp] is None:
             ramp = closing_ramp(d, press.shape[1], _RAMP)
             press[k, :, NUM_WRIST:] = ramp[:, None] * _closing_torque(d, env) / env.gains.stiffness

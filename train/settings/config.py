@@ -36,7 +36,9 @@ Settled = Callable[["Config", Sequence[str]], "Config"]
 # In `out`: a robot hand's results go to a folder of their own, in sweeps over hands too.
 OmegaConf.register_new_resolver("of_robot", lambda hand: "" if hand == HUMAN else f"-{Path(hand).stem}", replace=True)
 # For settings that were measured to differ.
-OmegaConf.register_new_resolver("human_or_robot", lambda hand, *either: either[hand != HUMAN], replace=True)
+OmegaConf.register_new_resolver(
+    "human_or_robot", lambda hand, human, robot: human if hand == HUMAN else robot, replace=True
+)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import binary_closing
 from scipy.spatial.transform import Rotation
 
-from envs.model_grip import FLOATS, NEAR, Touch
+from envs.model_grip import HOVER, NEAR, Touch
 from envs.reference import demonstrated_targets
 from envs.scene import demonstration_spec
 from mjx_hand.bodies.coordinates import hand_coordinates
@@ -85,10 +85,10 @@ def demonstrated_pads(demonstration: Demonstration, person: RigidHand) -> Pads:
     places = np.empty((demonstration.num_frames, len(fingers), 3))
     sites = {finger: model.site(f"{finger}_tip").id for finger in body.fingers}
     tips = {finger: np.empty((demonstration.num_frames, 3)) for finger in body.fingers}
-    off_ground = np.empty(demonstration.num_frames)
+    clearance = np.empty(demonstration.num_frames)
     for frame in range(demonstration.num_frames):
         touch.place(coordinates[frame], demonstration.object_pose[frame])
-        off_ground[frame] = touch.off_ground()
+        clearance[frame] = touch.object_clearance()
         for k, (number, place) in enumerate(on_links):
             places[frame, k] = touch.in_world(number, place)
         for finger, site in sites.items():
@@ -96,13 +96,18 @@ def demonstrated_pads(demonstration: Demonstration, person: RigidHand) -> Pads:
     near = np.array([[finger in found.get(frame, ()) for finger in fingers] for frame in range(len(places))])
     filled = np.ones((round(_FLICKER * demonstration.motion.fps), 1), bool)
     touching = binary_closing(np.pad(near, ((len(filled), len(filled)), (0, 0)), mode="edge"), filled)
-    touching, in_air = touching[len(filled) : -len(filled)], off_ground > min(off_ground[0], FLOATS) + _IN_AIR
-    turn = Rotation.from_quat(demonstration.object_pose[:, 3:], scalar_first=True).inv()
+    touching = touching[len(filled) : -len(filled)]
+    in_air = clearance > min(clearance[0], HOVER) + _IN_AIR
     for k in range(len(fingers)):
-        own = turn.apply(places[:, k] - demonstration.object_pose[:, :3])
-        touching[:, k] |= stays_held(touching[:, k], own, in_air)
+        touching[:, k] |= stays_held(touching[:, k], on_object(places[:, k], demonstration.object_pose), in_air)
     inward = np.stack([way for *_, way in held])
     return Pads(fingers, places, surface, inward, touching, in_air, tips, grasp, wraps)
+
+
+def on_object(places: Float[np.ndarray, "t 3"], object_pose: Float[np.ndarray, "t 7"]) -> Float[np.ndarray, "t 3"]:
+    """Where places (m, world) are as seen from the object, frame by frame."""
+    turn = Rotation.from_quat(object_pose[:, 3:], scalar_first=True)
+    return turn.inv().apply(places - object_pose[:, :3])
 
 
 def stays_held(

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from envs.demonstrations.on_robot.left_out import shared_pads
 from envs.demonstrations.on_robot.pads import demonstrated_pads
 from envs.demonstrations.on_robot.sticking import opposed
-from envs.model_grip import Touch
+from envs.model_grip import ANYWHERE, Touch
 from envs.physics.solver import gauss_seidel
 from envs.scene import base_rotation, demonstration_spec, wrist_coordinates
 from mjx_hand.bodies.body import Body
@@ -21,7 +21,6 @@ from mjx_hand.rigid.rigid_hand import RigidHand
 
 CLEAR = 0.001  # m off the object, beyond which a link that does not touch is not inside
 OFF_GROUND = 0.003  # m that links keep off table and support
-ANYWHERE = 10.0  # m: of every link, also where a step of a search throws the hand far from the object
 
 
 class RobotScene:

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import distance_transform_edt
 from scipy.spatial.transform import Rotation
 
-from envs.demonstrations.on_robot.pads import Pads
+from envs.demonstrations.on_robot.pads import Pads, on_object
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.motion.gaps import spans
 from mjx_hand.smoothstep import smoothstep
@@ -30,7 +30,7 @@ def followed_places(
     turn = Rotation.from_quat(demonstration.object_pose[:, 3:], scalar_first=True)
     wanted = np.empty_like(pads.places)
     for k, place in enumerate(grasp):
-        own = turn.inv().apply(pads.places[:, k] - position)  # the person's
+        own = on_object(pads.places[:, k], demonstration.object_pose)  # the person's
         stuck = own.copy()
         for first, end in spans(pads.touching[:, k]):
             inside = first <= pads.grasp < end

@@ -4,7 +4,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from envs.demonstrations.on_robot.bring import on_robot
 from envs.evaluation import constant_press as module
 from envs.evaluation.constant_press import constant_press, search_press
 from envs.evaluation.evaluate import evaluate
@@ -15,19 +14,10 @@ from envs.grip_force import RECORDED, grip_force_of
 from envs.scene import NUM_WRIST
 from envs.task import Task
 from envs.tracking import TrackingEnv
-from mjx_hand.bodies.robot_body import robot_body
 from mjx_hand.hand.joints import HINGES
 from mjx_hand.pytree import replace
-from tests.robots.urdfs import urdf_of
 
 PINCH = grasp_type("pinch")
-
-
-@pytest.fixture(scope="module")
-def allegro_pinch(demonstrations, hands):
-    assert urdf_of("allegro").is_file()  # skips without the package that carries it
-    body = robot_body("allegro")
-    return on_robot(demonstrations[1], hands[1], body).demonstration, body
 
 
 @pytest.fixture(scope="module")
@@ -112,17 +102,17 @@ def test_a_type_that_training_lacks_is_pressed_at_full_strength(env, press):
     assert jnp.isfinite(press.tables({}).reference.controls).all()
 
 
-def test_a_robots_grip_on_a_recorded_object_is_made_stronger(demonstrations, allegro_pinch):
+def test_a_robots_grip_on_a_recorded_object_is_made_stronger(brought, allegro):
     """No type says how to press it: a quarter of full strength is the reference's own grip, and wraps close with it."""
-    d, body = allegro_pinch
+    d = brought.demonstration
     recorded = replace(d, grasp=RECORDED)
-    env = TrackingEnv([recorded], [body], "native", Task(contacts="object"))
+    env = TrackingEnv([recorded], [allegro], "native", Task(contacts="object"))
     made = constant_press(env)
     own = made.tables({RECORDED: 0.25}).reference
     np.testing.assert_allclose(own.grip, env.reference.grip, atol=1e-5)
     stronger = np.abs(np.asarray(made.tables({RECORDED: 0.5}).reference.grip)).sum()
     assert stronger > 1.2 * np.abs(np.asarray(own.grip)).sum()
     assert made.described({RECORDED: 0.25}) == {RECORDED: "1 × the reference's grip"}
-    without = constant_press(TrackingEnv([recorded], [body], "native", Task(contacts="object", wrap_torque=0.0)))
+    without = constant_press(TrackingEnv([recorded], [allegro], "native", Task(contacts="object", wrap_torque=0.0)))
     weight = grip_force_of(d.object.mass, d.object.friction)
     assert without.described({RECORDED: 0.25}) == {RECORDED: f"{weight:.3g} N"}
