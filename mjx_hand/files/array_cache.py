@@ -19,7 +19,7 @@ from mjx_hand.files.working_folder import working_file
 
 SCHEMA = "mjx-hand/kept/1"
 _FOLDER = "arrays"
-_MOST = 60  # files; those that were used longest ago are deleted
+_MOST = 1_000_000_000  # bytes of all files; those that were used longest ago are deleted
 _CODE = tuple(Path(__file__).parents[2] / name for name in ("mjx_hand", "envs"))  # all: what matters is easily missed
 _LIBRARIES = ("jax", "jaxlib", "mujoco", "numpy", "scipy")
 
@@ -53,9 +53,19 @@ def cached(compute: Callable[[], Mapping[str, np.ndarray]], *ingredients: Any) -
     with working_file(path) as temporary:  # which goes with the next start, where a kill leaves it
         save_arrays(temporary, SCHEMA, arrays)
     with contextlib.suppress(FileNotFoundError):  # another process tidies up too
-        for old in sorted(path.parent.glob("[!.]*.npz"), key=lambda file: file.stat().st_mtime)[:-_MOST]:
-            old.unlink()
+        _tidy(path)
     return arrays
+
+
+def _tidy(newest: Path) -> None:
+    """Delete the files that were used longest ago, so that all take no more than `_MOST`; the newest stays."""
+    files = {file: file.stat() for file in newest.parent.glob("[!.]*.npz") if file != newest}
+    taken = newest.stat().st_size + sum(stat.st_size for stat in files.values())
+    for file in sorted(files, key=lambda file: files[file].st_mtime):
+        if taken <= _MOST:
+            break
+        file.unlink()
+        taken -= files[file].st_size
 
 
 def _cache() -> str | None:

@@ -88,10 +88,10 @@ def test_a_damaged_file_is_made_anew(folder, damage):
 
 
 def test_the_longest_unused_go(folder, monkeypatch):
-    monkeypatch.setattr(module, "_MOST", 2)
     compute = Counted()
     for k in range(2):
         cached(compute, k)
+    monkeypatch.setattr(module, "_MOST", sum(file.stat().st_size for file in folder.iterdir()))
     for age, path in enumerate(sorted(folder.glob("*.npz"), key=lambda p: p.stat().st_mtime_ns)):
         os.utime(path, (1000 + age, 1000 + age))
     cached(compute, 0)  # used: the other one is the oldest now
@@ -101,6 +101,9 @@ def test_the_longest_unused_go(folder, monkeypatch):
     assert compute.calls == 3
     cached(compute, 1)
     assert compute.calls == 4
+    monkeypatch.setattr(module, "_MOST", 0)
+    cached(compute, 3)
+    assert len(list(folder.iterdir())) == 1  # what was just made stays, however large
 
 
 def test_nothing_is_written_without_a_cache(monkeypatch, tmp_path):

@@ -14,8 +14,10 @@ from typing import Any
 from omegaconf import OmegaConf
 
 from envs.demonstrations.load_set import part_digest
+from envs.demonstrations.on_robot.robot_set import METHOD
 from envs.grip_force import RECORDED
 from envs.settings import from_dict
+from mjx_hand.bodies.human_body import HUMAN
 from mjx_hand.errors import InputError
 from mjx_hand.files.safe_yaml import read_yaml
 from train.settings.config import Config
@@ -48,6 +50,9 @@ _PLACES = ("demonstrations", "data.folder")  # taken from the run all the same w
 _POLICY = ("name", "data", "hand", "task", "ppo.policy_layers")  # what a policy cannot do without
 _RECORDING = ("data.recording",)  # of no account where the demonstrations are of no recording
 _FREE_OF_POLICY = ("engine",)  # any engine may play it
+_CONTENTS = "data.contents"  # digest of finished demonstrations
+_REFERENCES = "data.robot_references"  # how a robot's come about, `robot_set.METHOD`
+_FOUND = (_CONTENTS, _REFERENCES)  # not given: what there is, or how this version makes it
 # What runs were made with from before there were these options, where that is not the default that they came with.
 _BEFORE = {"task.wrap_torque": 0.0}
 
@@ -62,7 +67,8 @@ def settings_of(config: Config) -> Settings:
 def policy_settings(config: Config) -> Settings:
     """What must be the same for a policy to be scored."""
     told = _relevant(_told(config))
-    return {option: value for option, value in told.items() if _is(option, _POLICY) and not _is(option, _FREE)}
+    free = (*_FREE, _REFERENCES)  # of which any may be tried
+    return {option: value for option, value in told.items() if _is(option, _POLICY) and not _is(option, free)}
 
 
 def differing(before: Settings, now: Settings) -> list[str]:
@@ -85,6 +91,8 @@ def contradiction(what: str, before: Settings, now: Settings) -> str:
     options = differing(before, now)
     if not options:
         return ""
+    if options == [_REFERENCES]:
+        return f"{what} holds a training on a robot's demonstrations as an earlier version made them"
     others = f" and {len(options) - 1} more" if len(options) > 1 else ""
     was = _renamed(before).get(options[0], _unsaid().get(options[0]))
     return f"{what} holds a training with {options[0]}={was}, now {now.get(options[0])}{others}"
@@ -92,9 +100,7 @@ def contradiction(what: str, before: Settings, now: Settings) -> str:
 
 def write_settings(config: Config, path: Path) -> None:
     """Write all options as YAML, lists for tuples."""
-    options = json.loads(json.dumps(dataclasses.asdict(config)))
-    if config.data.folder:
-        options["data"]["contents"] = part_digest(config.data.folder, "train")
+    options = _nested(_told(config))
     path.write_text(OmegaConf.to_yaml(OmegaConf.create(options)))
 
 
@@ -122,7 +128,7 @@ def with_settings_of(config: Config, run: Settings, given: Collection[str], what
     Raises:
         InputError: an option was given that contradicts the run's.
     """
-    now = {option: value for option, value in _told(config).items() if option != "data.contents"}
+    now = {option: value for option, value in _told(config).items() if option not in _FOUND}
     if "config" in given:
         given = {*given, "name"}
     fixed = {o: v for o, v in now.items() if _is_given(o, given) and not _is(o, (*_FREE, *_FREE_OF_POLICY))}
@@ -144,7 +150,9 @@ def with_settings_of(config: Config, run: Settings, given: Collection[str], what
 def _told(config: Config) -> dict[str, Any]:
     options = _flat(json.loads(json.dumps(dataclasses.asdict(config))))
     if config.data.folder:
-        options["data.contents"] = part_digest(config.data.folder, "train")
+        options[_CONTENTS] = part_digest(config.data.folder, "train")
+    if config.hand != HUMAN:
+        options[_REFERENCES] = METHOD
     return options
 
 

@@ -1,6 +1,7 @@
 """Sets of demonstrations for a robot hand, kept from one start to the next."""
 
 import dataclasses
+import functools
 from collections import Counter
 from collections.abc import Sequence
 
@@ -19,6 +20,7 @@ from mjx_hand.rigid.rigid_hand import RigidHand
 
 METHOD = 4  # how references come about: counted up where they change, so that results on others are made anew
 _MOTION = ("angles", "wrist_position", "wrist_quaternion")
+_REHEARSAL, _LEFT_OUT = "rehearsal", "left out"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,28 +50,29 @@ def robot_set(demonstrations: Sequence[Demonstration], people: Sequence[RigidHan
         InputError: a hand of the other side.
     """
 
-    def compute() -> dict[str, np.ndarray]:
-        arrays: dict[str, np.ndarray] = {}
-        with counter(len(demonstrations), f"demonstrations on {body.name}") as advance:
-            for k, (d, person) in enumerate(zip(demonstrations, people, strict=True)):
-                try:
-                    brought = on_robot(d, person, body)
-                    arrays |= {f"{name}.{k}": getattr(brought.demonstration.motion, name) for name in _MOTION}
-                    arrays[f"rehearsal.{k}"] = np.array(dataclasses.astuple(brought.rehearsal))
-                except LeftOut as error:
-                    arrays[f"left out.{k}"] = np.array([error.reason, str(error)])
-                advance(1)
-        return arrays
-
-    arrays = cached(compute, "on a robot", list(demonstrations), body.name, model_bytes(body_model(body)))
     done, left_out, rehearsals = {}, {}, {}
-    for k, d in enumerate(demonstrations):
-        if f"left out.{k}" in arrays:
-            left_out[k] = LeftOut(*(str(text) for text in arrays[f"left out.{k}"]))
-        else:
-            done[k] = moved_by(body, d, *(np.asarray(arrays[f"{name}.{k}"]) for name in _MOTION))
-            rehearsals[k] = Rehearsal(*arrays[f"rehearsal.{k}"].tolist())
+    bare = model_bytes(body_model(body))
+    with counter(len(demonstrations), f"demonstrations on {body.name}") as advance:
+        for k, (d, person) in enumerate(zip(demonstrations, people, strict=True)):
+            # Each is kept by itself, so that a set that was interrupted goes on where it was.
+            arrays = cached(functools.partial(_brought, d, person, body), "on a robot", d, person, body.name, bare)
+            if _LEFT_OUT in arrays:
+                left_out[k] = LeftOut(*(str(text) for text in arrays[_LEFT_OUT]))
+            else:
+                done[k] = moved_by(body, d, *(np.asarray(arrays[name]) for name in _MOTION))
+                rehearsals[k] = Rehearsal(*arrays[_REHEARSAL].tolist())
+            advance(1)
     return RobotSet(done, left_out, rehearsals)
+
+
+def _brought(demonstration: Demonstration, person: RigidHand, body: Body) -> dict[str, np.ndarray]:
+    """A robot's motion and how its rehearsal went, or why it cannot do the demonstration."""
+    try:
+        brought = on_robot(demonstration, person, body)
+    except LeftOut as error:
+        return {_LEFT_OUT: np.array([error.reason, str(error)])}
+    motion = {name: getattr(brought.demonstration.motion, name) for name in _MOTION}
+    return {**motion, _REHEARSAL: np.array(dataclasses.astuple(brought.rehearsal))}
 
 
 def robot_demonstrations(

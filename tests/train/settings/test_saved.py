@@ -3,8 +3,17 @@
 import pytest
 
 from mjx_hand.errors import InputError
+from train.settings import saved
 from train.settings.config import compose
-from train.settings.saved import differing, read_settings, settings_of, with_settings_of, write_settings
+from train.settings.saved import (
+    contradiction,
+    differing,
+    policy_settings,
+    read_settings,
+    settings_of,
+    with_settings_of,
+    write_settings,
+)
 
 SINCE = ("task.wrap_torque",)
 
@@ -39,3 +48,18 @@ def test_a_run_may_be_measured_on_new_people(older):
     then = with_settings_of(now, older, {"config", "data.sealed_seed", "data.sealed_people"}, "the run")
     assert (then.data.sealed_seed, then.data.sealed_people) == (2, 3)
     assert differing(older, settings_of(then)) == []
+
+
+def test_a_robots_training_goes_on_with_the_demonstrations_it_began_with(tmp_path, monkeypatch):
+    """How a person's demonstrations become a robot's changes from version to version; a policy is scored on any."""
+    config = compose(["config=pinch", "hand=allegro"])
+    write_settings(config, tmp_path / "config.yaml")
+    told = read_settings(tmp_path / "config.yaml")
+    assert contradiction("it", told, settings_of(config)) == ""
+    policy = policy_settings(config)
+    monkeypatch.setattr(saved, "METHOD", saved.METHOD + 1)
+    assert "as an earlier version made them" in contradiction("it", told, settings_of(config))
+    assert contradiction("it", policy, policy_settings(config)) == ""
+    then = with_settings_of(config, told, {"config", "hand"}, "the run")
+    assert policy_settings(then) == policy
+    assert "robot" not in " ".join(settings_of(compose(["config=pinch"])))
