@@ -2,25 +2,28 @@
 
 A tracked hand shows where fingers are, not how hard they press. As in the references of training (`envs.grip`), the
 thumb presses with a force, the fingers that touch share as much between them, and each spreads its share over its
-phalanges; a hand whose thumb does not touch presses against the palm; one that wraps the object closes with a share of
-what its flexing joints can. Here contacts and derivatives are the C engine's, at the very state.
+phalanges that bear; a hand whose thumb does not touch presses against the palm; one that wraps the object closes with a
+share of what its flexing joints can. Fingers that their owner opens let go, whatever they still touch. Here contacts
+and derivatives are the C engine's, at the very state.
 """
 
 from collections import Counter
-from collections.abc import Mapping
 
 import mujoco
 import numpy as np
 from jaxtyping import Float
+from scipy.special import expit
 
 from envs.grip_force import grip_force_of
+from envs.live.twin.opening import Opening
 from envs.scene import NUM_WRIST
 from mjx_hand.hand.joints import FINGERS, FLEXES, LINKS, NUM_HINGES
 from mjx_hand.player.steadying import steadied
 from mjx_hand.rigid.gains import Gains
 
 NEAR = 0.008  # m: a phalanx that is closer to the object is taken to touch
-_SAFETY = 8.0  # times the force that just holds the object's weight by friction between thumb and fingers
+_BEARS, _SHARP = 0.002, 0.001  # m: one this close bears half of what it does where it touches, and over what that fades
+_SAFETY = 12.0  # times the force that just holds the object's weight by friction between thumb and fingers
 _LEAST = 2.0  # N
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
 _SOON = 0.15  # s over which a grip is taken up and let go: a finger that comes near does not snap shut
@@ -39,7 +42,7 @@ def notice_near(model: mujoco.MjModel, body: int) -> None:
         body: the object's.
     """
     of_hand = np.isin(model.geom_bodyid, [model.body(name).id for name in LINKS]) & (model.geom_contype > 0)
-    model.geom_margin[of_hand], model.geom_gap[of_hand] = NEAR, NEAR
+    model.geom_gap[of_hand] = NEAR
 
 
 class Grip:
@@ -57,10 +60,12 @@ class Grip:
         self._links = {model.body(name).id: k for k, name in enumerate(LINKS)}
         self._force = max(_LEAST, grip_force_of(mass, friction, _SAFETY / 2))
         self._jacobian = np.zeros((3, model.nv))
+        self._opening = Opening(model)
         self.reset()
 
     def reset(self) -> None:
         """The hand is elsewhere: nothing is held."""
+        self._opening.reset()
         self._offsets = np.zeros(NUM_HINGES)
         self._wraps = self._holds = False
         self._steady = self._tracked = np.zeros(NUM_HINGES)
@@ -74,9 +79,12 @@ class Grip:
             seconds: since the last call.
         """
         pressed = self._pressed(data, seconds)
-        self._steady = steadied(self._steady, self._tracked, angles, self._holds, seconds, np)
+        self._opening.watch(angles, data, self._holds, seconds)
+        # Fingers that their owner opens are followed, whatever they still touch.
+        holds = self._holds & ~self._opening.open
+        self._steady = steadied(self._steady, self._tracked, angles, holds, seconds, np)
         self._tracked = angles
-        return self._steady + pressed
+        return self._steady + pressed * self._opening.share
 
     def _pressed(self, data: mujoco.MjData, seconds: float) -> Float[np.ndarray, "20"]:
         """What to add to the hinges' targets (rad)."""
@@ -90,33 +98,34 @@ class Grip:
         if self._wraps:
             wanted = _WRAP_TORQUE * np.array(FLEXES) * self._gains.force_limit / self._gains.stiffness
         elif others:
-            wanted = self._press(data, nearest, phalanges)
+            wanted = self._press(data, nearest)
         else:  # a thumb alone presses nothing
             wanted = np.zeros(NUM_HINGES)
         self._offsets += min(1.0, seconds / _SOON) * (wanted - self._offsets)
         return self._offsets
 
     def _press(
-        self,
-        data: mujoco.MjData,
-        nearest: dict[int, tuple[float, np.ndarray, np.ndarray]],
-        phalanges: Mapping[int, int],
+        self, data: mujoco.MjData, nearest: dict[int, tuple[float, np.ndarray, np.ndarray]]
     ) -> Float[np.ndarray, "20"]:
         """Offsets (rad) that press with what is near: J^T f / kp, and a damped least-squares step that closes gaps."""
-        torque, rows, gaps = np.zeros(NUM_HINGES), [], []
-        others = len(phalanges.keys() - {_THUMB})
-        for link, (gap, place, inward) in nearest.items():
-            if link == 0:  # the palm is pressed against
-                continue
-            finger = (link - 1) // 3
-            share = 1.0 if finger == _THUMB else 1.0 / others
-            mujoco.mj_jac(self._model, data, self._jacobian, None, place, self._model.body(LINKS[link]).id)
-            rows.append(inward @ self._jacobian[:, _HINGES])
-            gaps.append(max(gap, 0.0))
-            torque += self._force * share / phalanges[finger] * rows[-1]
-        limit, lever = self._gains.force_limit, np.stack(rows)
-        step = lever.T @ np.linalg.solve(lever @ lever.T + _DAMPING**2 * np.eye(len(rows)), np.array(gaps))
-        return np.clip(torque, -limit, limit) / self._gains.stiffness + step
+        links = [link for link in nearest if link > 0]  # the palm is pressed against
+        gaps = np.array([nearest[link][0] for link in links])
+        finger = (np.array(links) - 1) // 3
+        bears = expit((_BEARS - gaps) / _SHARP)
+        of_finger = np.bincount(finger, bears, len(FINGERS))
+        others = len(set(finger.tolist()) - {_THUMB})
+        share = bears / np.maximum(of_finger, 1.0)[finger] / np.where(finger == _THUMB, 1, others)
+        lever = np.stack([self._lever(data, link, *nearest[link][1:]) for link in links])
+        limit, closing = self._gains.force_limit, np.maximum(gaps, 0.0)
+        step = lever.T @ np.linalg.solve(lever @ lever.T + _DAMPING**2 * np.eye(len(links)), closing)
+        return np.clip(self._force * share @ lever, -limit, limit) / self._gains.stiffness + step
+
+    def _lever(
+        self, data: mujoco.MjData, link: int, place: Float[np.ndarray, "3"], inward: Float[np.ndarray, "3"]
+    ) -> Float[np.ndarray, "20"]:
+        """How fast a link's place goes into the object with each hinge (m/rad)."""
+        mujoco.mj_jac(self._model, data, self._jacobian, None, place, self._model.body(LINKS[link]).id)
+        return inward @ self._jacobian[:, _HINGES]
 
     def _nearest(self, data: mujoco.MjData) -> dict[int, tuple[float, np.ndarray, np.ndarray]]:
         """Of each link that is near the object: the gap (m), its nearest place (m), the way into the object there."""

@@ -8,10 +8,11 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from envs.live.twin.opening import Opening
 from envs.live.twin.wrist import Wrist
 from envs.scene import NUM_WRIST, OBJECT
 from mjx_hand.errors import InputError
-from mjx_hand.hand.joints import FINGERS, NUM_HINGES
+from mjx_hand.hand.joints import NUM_HINGES
 from mjx_hand.objects.description import OBJECT_KINDS, ObjectDescription, object_features
 from mjx_hand.player.contact_force import contact_columns
 from mjx_hand.player.exported_policy import ExportedPolicy
@@ -19,11 +20,7 @@ from mjx_hand.player.features_read import features_read
 from mjx_hand.player.observed_state import HUMAN_NAMES, ObservedState
 from mjx_hand.player.steadying import holding, steadied
 
-_OPENS = 0.02  # m: a finger whose tracked tip goes so much away from the object lets go
-_CLOSES = 0.01  # m: one that comes so much nearer again presses again
-_SOON = 0.15  # s over which it does the one or the other
 _HAND = NUM_WRIST + NUM_HINGES
-_OF_FINGER = NUM_HINGES // len(FINGERS)
 
 
 def check_live(policy: ExportedPolicy, name: str, side: str) -> ExportedPolicy:
@@ -76,7 +73,7 @@ class PolicyAssist:
         self._tips = [model.site(f"{finger}_tip").id for finger in HUMAN_NAMES.fingers]
         self._forces = contact_columns(model)[:, :3]
         self._bodies = model.body("wrist").id, model.body(OBJECT).id
-        self._tracked = mujoco.MjData(model)
+        self._opening = Opening(model)
         self.reset()
 
     def reset(self) -> None:
@@ -84,10 +81,7 @@ class PolicyAssist:
         self._residual = np.zeros(_HAND, np.float32)
         self._commanded: np.ndarray | None = None  # and when that was, what was tracked
         self._last = np.zeros(NUM_HINGES)
-        self._object_in_hand = np.zeros(3)
-        self._turning = np.full(len(FINGERS), np.inf)
-        self._open = np.zeros(len(FINGERS), bool)
-        self._share = np.ones(len(FINGERS))
+        self._opening.reset()
         self._due = 0.0
 
     def pressing(self, angles: Float[np.ndarray, "20"], data: mujoco.MjData, seconds: float) -> Float[np.ndarray, "20"]:
@@ -103,12 +97,12 @@ class PolicyAssist:
         if self._due <= 0:
             mujoco.mj_kinematics(self._model, data)  # places follow the state; mj_step leaves them a step behind
             holds = bool(holding(data.sensordata[self._forces], np))
-            self._let_go(angles, data, holds)
+            self._opening.watch(angles, data, holds, self._seconds)
             seen = self._seen(self._commanded, data)
             features = np.concatenate([np.ravel(feature.value(seen)) for feature in self._features])
             _, self._residual = self._policy.step(features)
             # Fingers that their owner opens are followed, whatever they still touch.
-            steady = holds & ~np.repeat(self._open, _OF_FINGER)
+            steady = holds & ~self._opening.open
             told = self._commanded, self._last, angles, steady, self._seconds
             self._commanded, self._last = steadied(*told, np), angles
             self._due += self._seconds
@@ -117,29 +111,7 @@ class PolicyAssist:
 
     @property
     def _applied(self) -> Float[np.ndarray, "26"]:
-        return self._residual * np.concatenate([np.zeros(NUM_WRIST), np.repeat(self._share, _OF_FINGER)])
-
-    def _let_go(self, angles: Float[np.ndarray, "20"], data: mujoco.MjData, holds: bool) -> None:
-        """Fade the residuals of fingers that their owner opens, and take them up again where they are closed.
-
-        What counts is how far a tracked tip, which trackers see well, is from where in the hand the object was taken;
-        a thumb's joints tremble by more than it opens, and an object that slips is no finger that opens.
-        """
-        self._tracked.qpos[:] = data.qpos
-        self._tracked.qpos[NUM_WRIST:_HAND] = angles
-        mujoco.mj_kinematics(self._model, self._tracked)
-        wrist, axes = data.xpos[self._bodies[0]], data.xmat[self._bodies[0]].reshape(3, 3)
-        if not holds:
-            self._object_in_hand = (data.qpos[_HAND : _HAND + 3] - wrist) @ axes
-        tips = (self._tracked.site_xpos[self._tips] - wrist) @ axes
-        away = np.linalg.norm(tips - self._object_in_hand, axis=1)
-        # `_turning` is how near a finger was at most since it closed, or how far since it opened.
-        self._turning = np.where(self._open, np.maximum(self._turning, away), np.minimum(self._turning, away))
-        turned = np.where(self._open, away < self._turning - _CLOSES, away > self._turning + _OPENS)
-        self._open ^= turned
-        self._turning = np.where(turned, away, self._turning)
-        step = min(1.0, self._seconds / _SOON)
-        self._share += step * (np.where(self._open, 0.0, 1.0) - self._share)
+        return self._residual * np.concatenate([np.zeros(NUM_WRIST), self._opening.share])
 
     def _seen(self, commanded: Float[np.ndarray, "20"], data: mujoco.MjData) -> ObservedState:
         """What the policy may see of hinges that were told so without it; what only demonstrations tell is none."""

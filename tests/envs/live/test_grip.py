@@ -77,6 +77,16 @@ def test_a_hand_away_from_the_object_is_as_it_is_tracked(pinching):
     assert world.touches() == []
 
 
+def test_fingers_meet_the_object_and_not_the_air_around_it(pinching):
+    """They are noticed before they touch, and bear where they do: a pad gives by less than a millimetre."""
+    rigid, pose, table = pinching
+    world = World(rigid, table, pose, "grip")
+    pressed(world, pose)
+    gaps = [contact.dist for contact in world.data.contact if contact.efc_address >= 0]
+    assert gaps
+    assert max(gaps) < 1e-4
+
+
 def test_what_is_only_near_is_no_touch(pinching):
     rigid, pose, table = pinching
     thinner = ObjectDescription(
@@ -121,6 +131,22 @@ def test_a_fist_closes_with_every_flexing_joint_and_opens_again(fist):
     opened = HandPose(pose.position, pose.quaternion, np.zeros(20))
     away = [name.startswith(("middle", "ring")) for name in HINGES]  # of a flat hand others are still near the handle
     np.testing.assert_allclose(told(world, opened, 1500)[away], 0.0, atol=0.02)
+
+
+def test_fingers_that_open_let_go_though_they_touch_still(pinching):
+    """While they hold, joints are low-passed: without looking at where fingers are tracked they would hold on."""
+    rigid, pose, table = pinching
+    world = World(rigid, table, pose, "grip")
+    pressed(world, pose, 150)
+    assert touching(world) == {"index", "thumb"}
+    angles = np.where([name.startswith("thumb") for name in HINGES], pose.angles, 0)
+    opened = HandPose(pose.position, pose.quaternion, angles)
+    pressed(world, opened, 75)
+    assert touching(world) == {"thumb"}
+
+
+def touching(world: World) -> set[str]:
+    return {touch.link[:-1] for touch in world.touches()}
 
 
 def test_a_holding_hand_does_not_pass_on_the_trackers_trembling(fist):

@@ -186,23 +186,6 @@ def test_a_hand_put_elsewhere_begins_anew(live, closing):
         np.testing.assert_array_equal(world.data.ctrl, rest.data.ctrl)
 
 
-def test_an_object_that_slips_in_a_hand_is_no_finger_that_opens(closing):
-    """While the hand holds, it is where the object was taken that counts."""
-    world, pose = closing
-    residuals(world, pose, 0.5)
-    helper = world._helper
-    assert isinstance(helper, PolicyAssist)
-    away = world.data.qpos[26:29].copy()
-    for k in range(60):
-        world.data.qpos[26:29] = away - [0, 0.0005 * k, 0]
-        helper._let_go(pose.angles, world.data, holds=True)
-    assert not helper._open.any()
-    for k in range(60):
-        world.data.qpos[26:29] = away - [0, 0.03 + 0.0005 * k, 0]
-        helper._let_go(pose.angles, world.data, holds=False)
-    assert helper._open.all()
-
-
 def test_what_cannot_help_is_refused(tmp_path):
     follows = policy_of(dataclasses.replace(TASK, live=False), live=False)
     with pytest.raises(InputError, match=r"task\.live=true"):
