@@ -19,7 +19,7 @@ from train.experiment.stress import stress
 from train.reports.evaluation_page import evaluation_page, films, tables
 from train.reports.evaluation_record import write_results
 from train.reports.stress_table import stress_table, write_stress
-from train.settings.config import Config, command_of_seeds
+from train.settings.config import Config, command_with_seeds
 
 
 def evaluate_and_write(configs: Sequence[Config]) -> tuple[Path, tuple[Table, ...]]:
@@ -53,7 +53,7 @@ def main(configs: Sequence[Config]) -> None:
 
 def command_line() -> None:
     """The command, with this process's arguments."""
-    command_of_seeds(main, settled)
+    command_with_seeds(main, settled)
 
 
 if __name__ == "__main__":

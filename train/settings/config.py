@@ -192,7 +192,7 @@ def command(task: Callable[[Config], object], settled: Settled | None = None) ->
     _command(lambda composed, given: task(_on_device(_settled(to_config(composed), given, settled))))
 
 
-def command_of_seeds(task: Callable[[Sequence[Config]], object], settled: Settled | None = None) -> None:
+def command_with_seeds(task: Callable[[Sequence[Config]], object], settled: Settled | None = None) -> None:
     """Like `command`, for a task that takes the configurations of several seeds (`seeds=[0,1,2]`)."""
     _command(
         lambda composed, given: task([_on_device(_settled(one, given, settled)) for one in expand_seeds(composed)])

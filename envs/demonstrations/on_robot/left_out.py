@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from envs.demonstrations.on_robot.pads import Pads
+from envs.demonstrations.on_robot.pads import DemonstratedPads
 from mjx_hand.bodies.body import Body
 from mjx_hand.errors import InputError
 
@@ -22,7 +22,7 @@ class LeftOut(InputError):
         self.reason = reason
 
 
-def shared_pads(pads: Pads, body: Body) -> Pads:
+def shared_pads(pads: DemonstratedPads, body: Body) -> DemonstratedPads:
     """The pads of fingers that the robot has.
 
     Raises:

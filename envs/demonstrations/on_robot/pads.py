@@ -23,7 +23,7 @@ _LET_GO = 0.01  # m that a pad moves on the object as it lets go in the air; cap
 
 
 @dataclasses.dataclass(frozen=True)
-class Pads:
+class DemonstratedPads:
     """What a person's fingers do in a demonstration of t frames, in the world (m).
 
     Attributes:
@@ -50,7 +50,7 @@ class Pads:
     wraps: bool
 
 
-def demonstrated_pads(demonstration: Demonstration, person: RigidHand) -> Pads:
+def demonstrated_pads(demonstration: Demonstration, person: RigidHand) -> DemonstratedPads:
     """The pads of a person's demonstration.
 
     The frame of the grasp is the last in which as many fingers touch as ever do while the object is off its support.
@@ -71,7 +71,9 @@ def demonstrated_pads(demonstration: Demonstration, person: RigidHand) -> Pads:
     if not lifted:
         frames = demonstration.num_frames
         nowhere, never = np.zeros((0, 3)), np.zeros((frames, 0), bool)
-        return Pads((), np.zeros((frames, 0, 3)), nowhere, nowhere, never, np.zeros(frames, bool), {}, 0, False)
+        return DemonstratedPads(
+            (), np.zeros((frames, 0, 3)), nowhere, nowhere, never, np.zeros(frames, bool), {}, 0, False
+        )
     most = max(len(found[frame]) for frame in lifted)
     grasp = max(frame for frame in lifted if len(found[frame]) == most)
     fingers = tuple(sorted(found[grasp], key=lambda name: (name != "thumb", body.fingers.index(name))))
@@ -101,7 +103,7 @@ def demonstrated_pads(demonstration: Demonstration, person: RigidHand) -> Pads:
     for k in range(len(fingers)):
         touching[:, k] |= stays_held(touching[:, k], on_object(places[:, k], demonstration.object_pose), in_air)
     inward = np.stack([way for *_, way in held])
-    return Pads(fingers, places, surface, inward, touching, in_air, tips, grasp, wraps)
+    return DemonstratedPads(fingers, places, surface, inward, touching, in_air, tips, grasp, wraps)
 
 
 def on_object(places: Float[np.ndarray, "t 3"], object_pose: Float[np.ndarray, "t 7"]) -> Float[np.ndarray, "t 3"]:

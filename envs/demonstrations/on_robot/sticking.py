@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import distance_transform_edt
 from scipy.spatial.transform import Rotation
 
-from envs.demonstrations.on_robot.pads import Pads, on_object
+from envs.demonstrations.on_robot.pads import DemonstratedPads, on_object
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.motion.gaps import spans
 from mjx_hand.smoothstep import smoothstep
@@ -20,7 +20,7 @@ _AT_REST = 0.005  # m from where the object stands at the beginning or the end
 
 
 def followed_places(
-    pads: Pads, grasp: Float[np.ndarray, "f 3"], demonstration: Demonstration
+    pads: DemonstratedPads, grasp: Float[np.ndarray, "f 3"], demonstration: Demonstration
 ) -> Float[np.ndarray, "t f 3"]:
     """Where each pad is to be in each frame (m, world), if in the grasp's frame they are at `grasp` (m, world).
 

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from envs.demonstrations.on_robot.pads import Pads
+from envs.demonstrations.on_robot.pads import DemonstratedPads
 from envs.demonstrations.on_robot.sticking import followed_places, onto, opposed, still_near
 from mjx_hand.pytree import replace
 
@@ -19,7 +19,9 @@ def test_a_pad_sticks_while_the_finger_touches_and_follows_it_else(demonstration
     own = np.stack([0.02 + 0.001 * np.sin(t / 5), np.maximum(FIRST - t, 0) * 0.001, 0.0 * t], axis=1)  # slips, comes
     places = (position + turn.apply(own))[:, None]
     touching = ((t >= FIRST) & (t < LAST))[:, None]
-    pads = Pads(("thumb",), places, np.zeros((1, 3)), np.zeros((1, 3)), touching, t >= FIRST, {}, GRASP, False)
+    pads = DemonstratedPads(
+        ("thumb",), places, np.zeros((1, 3)), np.zeros((1, 3)), touching, t >= FIRST, {}, GRASP, False
+    )
     off = np.array([0.001, 0.002, -0.003])
     grasp = position[GRASP] + turn[GRASP].apply(own[GRASP] + off)
     seen = turn.inv().apply(followed_places(pads, grasp[None], d)[:, 0] - position)
