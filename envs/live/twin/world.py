@@ -57,7 +57,7 @@ class World:
             self._helper = PolicyAssist(self.model, self._wrist, table.object, assist)
         elif assist == GRIP:
             body = int(self._bodies[-1])
-            notice_near(self.model, body)
+            notice_near(self.model)
             self._helper = Grip(self.model, body, float(table.object.mass), float(table.object.friction), gains)
         self.reset(start)
 
