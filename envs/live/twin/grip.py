@@ -35,7 +35,7 @@ _HINGES = slice(NUM_WRIST, NUM_WRIST + NUM_HINGES)
 
 
 def notice_near(model: mujoco.MjModel) -> None:
-    """Have the engine list what is nearer than `NEAR` to the hand, without pushing it; the model is changed in place."""
+    """Have the engine list what is nearer than `NEAR` to the hand, without pushing it; changes the model in place."""
     of_hand = np.isin(model.geom_bodyid, [model.body(name).id for name in LINKS]) & (model.geom_contype > 0)
     model.geom_gap[of_hand] = NEAR
 

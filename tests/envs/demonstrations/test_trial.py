@@ -16,6 +16,7 @@ from envs.grip_table import default_grip_force, grip_forces
 from envs.task import Task
 from envs.tracking import TrackingEnv
 from mjx_hand.errors import InputError
+from mjx_hand.files import array_cache
 from mjx_hand.pytree import replace
 
 FORCE = 12.0  # N, with which demonstrations of pinches are made
@@ -100,3 +101,23 @@ def test_objects_that_are_lost_in_rehearsal_are_told(demonstrations, hands, alle
     made = robot_set.robot_demonstrations(demonstrations[:2], hands[:2], allegro)
     assert len(made) == 2
     assert "allegro: without a policy 1 of 2 objects of pinch are lost on the way" in capsys.readouterr().out
+
+
+def test_an_interrupted_set_goes_on_where_it_was(demonstrations, hands, allegro, brought, monkeypatch, tmp_path):
+    asked = []
+
+    def on_robot(d, person, body):  # type: ignore[no-untyped-def]
+        asked.append(d)
+        if len(asked) == 2:
+            raise KeyboardInterrupt
+        return brought
+
+    monkeypatch.setattr(robot_set, "on_robot", on_robot)
+    monkeypatch.setattr(array_cache, "_cache", lambda: str(tmp_path))
+    with pytest.raises(KeyboardInterrupt):
+        robot_set.robot_set(demonstrations[:3], hands[:3], allegro)
+    made = robot_set.robot_set(demonstrations[:3], hands[:3], allegro)
+    assert [id(d) for d in asked] == [id(demonstrations[k]) for k in (0, 1, 1, 2)]
+    assert list(made.done) == [0, 1, 2]
+    np.testing.assert_array_equal(made.done[0].motion.angles, brought.demonstration.motion.angles)
+    assert made.rehearsals[0] == brought.rehearsal
