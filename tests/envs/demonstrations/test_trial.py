@@ -115,9 +115,9 @@ def test_an_interrupted_set_goes_on_where_it_was(demonstrations, hands, allegro,
     monkeypatch.setattr(robot_set, "on_robot", on_robot)
     monkeypatch.setattr(array_cache, "_cache", lambda: str(tmp_path))
     with pytest.raises(KeyboardInterrupt):
-        robot_set.robot_set(demonstrations[:3], hands[:3], allegro)
-    made = robot_set.robot_set(demonstrations[:3], hands[:3], allegro)
-    assert [id(d) for d in asked] == [id(demonstrations[k]) for k in (0, 1, 1, 2)]
-    assert list(made.done) == [0, 1, 2]
+        robot_set.robot_set(demonstrations[:2], hands[:2], allegro)
+    made = robot_set.robot_set(demonstrations[:2], hands[:2], allegro)
+    assert [id(d) for d in asked] == [id(demonstrations[k]) for k in (0, 1, 1)]
+    assert list(made.done) == [0, 1]
     np.testing.assert_array_equal(made.done[0].motion.angles, brought.demonstration.motion.angles)
     assert made.rehearsals[0] == brought.rehearsal
