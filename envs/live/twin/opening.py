@@ -67,8 +67,8 @@ class Opening:
             self._object_in_hand = (data.qpos[_HAND : _HAND + 3] - wrist) @ axes
         tips = (self._tracked.site_xpos[self._tips] - wrist) @ axes
         seen = np.linalg.norm(tips - self._object_in_hand, axis=1)
-        self._away = seen if self._away is None else self._away + min(1.0, seconds / _TREMBLE) * (seen - self._away)
-        away = self._away
+        before = seen if self._away is None else self._away
+        self._away = away = before + min(1.0, seconds / _TREMBLE) * (seen - before)
         # `_turning` is how near a finger was at most since it closed, or how far since it opened.
         self._turning = np.where(self._open, np.maximum(self._turning, away), np.minimum(self._turning, away))
         turned = np.where(self._open, away < self._turning - _CLOSES, away > self._turning + _OPENS)
