@@ -52,20 +52,25 @@ def cached(compute: Callable[[], Mapping[str, np.ndarray]], *ingredients: Any) -
     arrays = compute()
     with working_file(path) as temporary:  # which goes with the next start, where a kill leaves it
         save_arrays(temporary, SCHEMA, arrays)
-    with contextlib.suppress(FileNotFoundError):  # another process tidies up too
-        _tidy(path)
+    _tidy(path)
     return arrays
 
 
 def _tidy(newest: Path) -> None:
     """Delete the files that were used longest ago, so that all take no more than `_MOST`; the newest stays."""
-    files = {file: file.stat() for file in newest.parent.glob("[!.]*.npz") if file != newest}
-    taken = newest.stat().st_size + sum(stat.st_size for stat in files.values())
-    for file in sorted(files, key=lambda file: files[file].st_mtime):
+    files = []
+    for file in newest.parent.glob("[!.]*.npz"):
+        with contextlib.suppress(OSError):  # another process tidies up too
+            stat = file.stat()
+            files.append((stat.st_mtime, stat.st_size, file))
+    taken = sum(size for _, size, _ in files)
+    for _, size, file in sorted(files):
         if taken <= _MOST:
             break
-        file.unlink()
-        taken -= files[file].st_size
+        if file != newest:
+            with contextlib.suppress(OSError):  # another's, or one that is being read where that keeps it
+                file.unlink()
+            taken -= size
 
 
 def _cache() -> str | None:

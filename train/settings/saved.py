@@ -92,7 +92,8 @@ def contradiction(what: str, before: Settings, now: Settings) -> str:
     if not options:
         return ""
     if options == [_REFERENCES]:
-        return f"{what} holds a training on a robot's demonstrations as an earlier version made them"
+        return f"{what} holds a training on a robot's demonstrations as another version of mjx-hand made them"
+    options = [option for option in options if option != _REFERENCES]  # which no command line has
     others = f" and {len(options) - 1} more" if len(options) > 1 else ""
     was = _renamed(before).get(options[0], _unsaid().get(options[0]))
     return f"{what} holds a training with {options[0]}={was}, now {now.get(options[0])}{others}"

@@ -49,13 +49,12 @@ def robot_set(demonstrations: Sequence[Demonstration], people: Sequence[RigidHan
     Raises:
         InputError: a hand of the other side.
     """
-
     done, left_out, rehearsals = {}, {}, {}
-    bare = model_bytes(body_model(body))
+    model = model_bytes(body_model(body))
     with counter(len(demonstrations), f"demonstrations on {body.name}") as advance:
         for k, (d, person) in enumerate(zip(demonstrations, people, strict=True)):
-            # Each is kept by itself, so that a set that was interrupted goes on where it was.
-            arrays = cached(functools.partial(_brought, d, person, body), "on a robot", d, person, body.name, bare)
+            # Each is kept by itself, so that a set that was interrupted goes on where it was, with the same code.
+            arrays = cached(functools.partial(_brought, d, person, body), "on a robot", d, person, body.name, model)
             if _LEFT_OUT in arrays:
                 left_out[k] = LeftOut(*(str(text) for text in arrays[_LEFT_OUT]))
             else:

@@ -12,7 +12,6 @@ from collections import Counter
 import mujoco
 import numpy as np
 from jaxtyping import Float
-from scipy.special import expit
 
 from envs.grip_force import grip_force_of
 from envs.live.twin.opening import Opening
@@ -21,8 +20,8 @@ from mjx_hand.hand.joints import FINGERS, FLEXES, LINKS, NUM_HINGES
 from mjx_hand.player.steadying import steadied
 from mjx_hand.rigid.gains import Gains
 
-NEAR = 0.008  # m: a phalanx that is closer to the object is taken to touch
-_BEARS, _SHARP = 0.002, 0.001  # m: one this close bears half of what it does where it touches, and over what that fades
+NEAR = 0.008  # m: a phalanx that is closer to the object is part of the grip, and brought to the surface
+_BEARS = 0.003  # m: it presses the more the closer it is, from here on, and fully where it touches
 _SAFETY = 12.0  # times the force that just holds the object's weight by friction between thumb and fingers
 _LEAST = 2.0  # N
 _DAMPING = 0.01  # m/rad, of the step that closes gaps
@@ -30,6 +29,7 @@ _SOON = 0.15  # s over which a grip is taken up and let go: a finger that comes 
 _WRAP_TORQUE = 0.75  # of their torque limits, with which flexing joints close around an object
 # Fingers besides the thumb that are near with two phalanges where a hand begins to wrap, and phalanges when it ends.
 _WRAPS, _LETS_GO = 3, 2
+_WATCHED = 0.02  # s between two looks at whether fingers open
 _THUMB = FINGERS.index("thumb")
 _HINGES = slice(NUM_WRIST, NUM_WRIST + NUM_HINGES)
 
@@ -63,6 +63,7 @@ class Grip:
         self._opening.reset()
         self._offsets = np.zeros(NUM_HINGES)
         self._wraps = self._holds = False
+        self._unwatched = _WATCHED
         self._steady = self._tracked = np.zeros(NUM_HINGES)
 
     def pressing(self, angles: Float[np.ndarray, "20"], data: mujoco.MjData, seconds: float) -> Float[np.ndarray, "20"]:
@@ -74,7 +75,10 @@ class Grip:
             seconds: since the last call.
         """
         pressed = self._pressed(data, seconds)
-        self._opening.watch(angles, data, self._holds, seconds)
+        self._unwatched += seconds
+        if self._unwatched >= _WATCHED:
+            self._opening.watch(angles, data, self._holds, self._unwatched)
+            self._unwatched = 0.0
         # Fingers that their owner opens are followed, whatever they still touch.
         holds = self._holds & ~self._opening.open
         self._steady = steadied(self._steady, self._tracked, angles, holds, seconds, np)
@@ -106,10 +110,13 @@ class Grip:
         links = [link for link in nearest if link > 0]  # the palm is pressed against
         gaps = np.array([nearest[link][0] for link in links])
         finger = (np.array(links) - 1) // 3
-        bears = expit((_BEARS - gaps) / _SHARP)
+        bears = np.clip(1 - gaps / _BEARS, 0.0, 1.0)
         of_finger = np.bincount(finger, bears, len(FINGERS))
-        others = len(set(finger.tolist()) - {_THUMB})
-        share = bears / np.maximum(of_finger, 1.0)[finger] / np.where(finger == _THUMB, 1, others)
+        # Fingers that are only near, and those that their owner opens, take nothing from those that press.
+        presses = np.minimum(of_finger, 1.0) * self._opening.share_of_finger
+        leads = np.arange(len(FINGERS)) == _THUMB
+        of_hand = np.where(leads, 1.0, 1.0 / max(float(presses[~leads].sum()), 1.0))
+        share = bears / np.maximum(of_finger, 1.0)[finger] * of_hand[finger]
         lever = np.stack([self._lever(data, link, *nearest[link][1:]) for link in links])
         limit, closing = self._gains.force_limit, np.maximum(gaps, 0.0)
         step = lever.T @ np.linalg.solve(lever @ lever.T + _DAMPING**2 * np.eye(len(links)), closing)

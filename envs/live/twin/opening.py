@@ -4,13 +4,13 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
-from envs.scene import NUM_WRIST, OBJECT
+from envs.scene import NUM_WRIST
 from mjx_hand.hand.joints import FINGERS, NUM_HINGES
 
-_OPENS = 0.014  # m: a finger whose tracked tip goes so much away from the object lets go
+_OPENS = 0.014  # m: a finger whose tracked tip goes so much farther from the object than it was lets go
 _CLOSES = 0.01  # m: one that comes so much nearer again presses again
 _TREMBLE = 0.25  # s: of the low-pass of the tips, which trackers have several millimetres off
-_SOON = 0.15  # s over which it does the one or the other
+_SOON = 0.15  # s: the time constant with which it does the one or the other
 _HAND = NUM_WRIST + NUM_HINGES
 _OF_FINGER = NUM_HINGES // len(FINGERS)
 
@@ -23,13 +23,15 @@ class Opening:
 
     Args:
         model: of a live world.
+
+    Attributes:
+        share_of_finger: how much of what helps each finger is left, from 1 to 0.
     """
 
     def __init__(self, model: mujoco.MjModel):
         self._model, self._tracked = model, mujoco.MjData(model)
         self._tips = [model.site(f"{finger}_tip").id for finger in FINGERS]
         self._wrist = model.body("wrist").id
-        self._object = model.body(OBJECT).id
         self.reset()
 
     def reset(self) -> None:
@@ -38,7 +40,7 @@ class Opening:
         self._turning = np.full(len(FINGERS), np.inf)
         self._away: np.ndarray | None = None
         self._open = np.zeros(len(FINGERS), bool)
-        self._share = np.ones(len(FINGERS))
+        self.share_of_finger = np.ones(len(FINGERS))
 
     @property
     def open(self) -> Bool[np.ndarray, "20"]:
@@ -48,7 +50,7 @@ class Opening:
     @property
     def share(self) -> Float[np.ndarray, "20"]:
         """Of each hinge, how much of what helps it is left, from 1 to 0."""
-        return np.repeat(self._share, _OF_FINGER)
+        return np.repeat(self.share_of_finger, _OF_FINGER)
 
     def watch(self, angles: Float[np.ndarray, "20"], data: mujoco.MjData, holds: bool, seconds: float) -> None:
         """See where the tips are now.
@@ -62,7 +64,7 @@ class Opening:
         self._tracked.qpos[:] = data.qpos
         self._tracked.qpos[NUM_WRIST:_HAND] = angles
         mujoco.mj_kinematics(self._model, self._tracked)
-        wrist, axes = data.xpos[self._wrist], data.xmat[self._wrist].reshape(3, 3)
+        wrist, axes = self._tracked.xpos[self._wrist], self._tracked.xmat[self._wrist].reshape(3, 3)
         if not holds:
             self._object_in_hand = (data.qpos[_HAND : _HAND + 3] - wrist) @ axes
         tips = (self._tracked.site_xpos[self._tips] - wrist) @ axes
@@ -75,4 +77,4 @@ class Opening:
         self._open ^= turned
         self._turning = np.where(turned, away, self._turning)
         step = min(1.0, seconds / _SOON)
-        self._share += step * (np.where(self._open, 0.0, 1.0) - self._share)
+        self.share_of_finger += step * (np.where(self._open, 0.0, 1.0) - self.share_of_finger)

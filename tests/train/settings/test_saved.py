@@ -58,8 +58,10 @@ def test_a_robots_training_goes_on_with_the_demonstrations_it_began_with(tmp_pat
     assert contradiction("it", told, settings_of(config)) == ""
     policy = policy_settings(config)
     monkeypatch.setattr(saved, "METHOD", saved.METHOD + 1)
-    assert "as an earlier version made them" in contradiction("it", told, settings_of(config))
+    assert "as another version of mjx-hand made them" in contradiction("it", told, settings_of(config))
     assert contradiction("it", policy, policy_settings(config)) == ""
     then = with_settings_of(config, told, {"config", "hand"}, "the run")
     assert policy_settings(then) == policy
-    assert "robot" not in " ".join(settings_of(compose(["config=pinch"])))
+    human = settings_of(compose(["config=pinch"]))
+    assert "robot" not in " ".join(human)
+    assert contradiction("it", told, human) == "it holds a training with hand=allegro, now human"
