@@ -49,9 +49,9 @@ _FREE = (
 _PLACES = ("demonstrations", "data.folder")  # taken from the run all the same where nothing else is given
 _POLICY = ("name", "data", "hand", "task", "ppo.policy_layers")  # what a policy cannot do without
 _RECORDING = ("data.recording",)  # of no account where the demonstrations are of no recording
-_FREE_OF_POLICY = ("engine",)  # any engine may play it
 _CONTENTS = "data.contents"  # digest of finished demonstrations
 _REFERENCES = "data.robot_references"  # how a robot's come about, `robot_set.METHOD`
+_FREE_OF_POLICY = ("engine", _REFERENCES)  # any engine may play it, after any references
 _FOUND = (_CONTENTS, _REFERENCES)  # not given: what there is, or how this version makes it
 # What runs were made with from before there were these options, where that is not the default that they came with.
 _BEFORE = {"task.wrap_torque": 0.0}
@@ -67,7 +67,7 @@ def settings_of(config: Config) -> Settings:
 def policy_settings(config: Config) -> Settings:
     """What must be the same for a policy to be scored."""
     told = _relevant(_told(config))
-    free = (*_FREE, _REFERENCES)  # of which any may be tried
+    free = (*_FREE, *_FREE_OF_POLICY)
     return {option: value for option, value in told.items() if _is(option, _POLICY) and not _is(option, free)}
 
 

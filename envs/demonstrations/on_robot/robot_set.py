@@ -14,6 +14,7 @@ from mjx_hand.bodies.body import Body
 from mjx_hand.bodies.body_places import body_model
 from mjx_hand.errors import InputError
 from mjx_hand.files.array_cache import cached, model_bytes
+from mjx_hand.files.digests import digest
 from mjx_hand.motion.demonstration import Demonstration
 from mjx_hand.progress import counter
 from mjx_hand.rigid.rigid_hand import RigidHand
@@ -50,7 +51,7 @@ def robot_set(demonstrations: Sequence[Demonstration], people: Sequence[RigidHan
         InputError: a hand of the other side.
     """
     done, left_out, rehearsals = {}, {}, {}
-    model = model_bytes(body_model(body))
+    model = digest([model_bytes(body_model(body))])  # megabytes, read once and not for each demonstration
     with counter(len(demonstrations), f"demonstrations on {body.name}") as advance:
         for k, (d, person) in enumerate(zip(demonstrations, people, strict=True)):
             # Each is kept by itself, so that a set that was interrupted goes on where it was, with the same code.
